@@ -1,0 +1,5 @@
+//! 2D images: filters, PNG and drawing.
+
+mod image2d;
+
+pub use image2d::Image;

@@ -1,0 +1,3 @@
+//! The `pao-sim` command.
+
+fn main() {}

@@ -1,0 +1,1 @@
+//! Optimizers over vectors and costs: CMA-ES and BOBYQA.

@@ -1,0 +1,5 @@
+//! Estimates the fragment's shape from cut lines in the images.
+
+pub mod annotation;
+
+pub use annotation::{Crossing, CutAnnotation};

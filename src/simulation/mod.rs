@@ -1,0 +1,1 @@
+//! One case: perturb, move, wires, warp, views, fluoroscopy, picks, annotations. Holds the truth.

@@ -1,0 +1,1 @@
+//! Summaries, rank tests, effect sizes and the bootstrap.

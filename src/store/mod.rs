@@ -1,0 +1,1 @@
+//! Rows on disk: schema, journal, Parquet parts and the manifest.

@@ -1,0 +1,1 @@
+//! Configuration, plan, runner and resume of a study.
