@@ -5,6 +5,7 @@
 
 pub mod euler;
 pub mod plane;
+pub mod pose_error;
 pub mod ray;
 pub mod se3;
 
@@ -18,4 +19,5 @@ pub type Vector = nalgebra::Vector3<f64>;
 pub type Pixel = nalgebra::Point2<f64>;
 
 pub use plane::Plane;
+pub use pose_error::PoseError;
 pub use ray::Ray;
