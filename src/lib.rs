@@ -11,6 +11,7 @@ pub mod random;
 pub mod registration;
 pub mod report;
 pub mod shape_estimation;
+pub mod simd;
 pub mod simulation;
 pub mod statistics;
 pub mod store;

@@ -1,5 +1,8 @@
 //! 2D images: filters, PNG and drawing.
 
+pub mod filter;
 mod image2d;
+mod rect;
 
 pub use image2d::Image;
+pub use rect::PixelRect;
