@@ -1,7 +1,19 @@
 //! The X-ray imaging chain: camera, attenuation, projection, image pyramid and photon noise.
 
+pub mod attenuation;
 pub mod bone;
 pub mod camera;
+pub mod footprint;
+mod kernel;
+mod rays;
+pub mod reference;
+pub mod simd;
 
+pub use attenuation::AttenuationParameters;
 pub use bone::BoneVolume;
 pub use camera::{Camera, Orbit};
+pub use footprint::PixelRect;
+pub use simd::SimdLevel;
+
+#[cfg(test)]
+mod projection_tests;
