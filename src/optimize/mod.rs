@@ -3,5 +3,5 @@
 mod bobyqa_box;
 mod cmaes;
 
-pub use bobyqa_box::{BoxOutcome, BoxSearch, minimize_in_box};
+pub use bobyqa_box::{BoxError, BoxOutcome, BoxSearch, minimize_in_box};
 pub use cmaes::{CmaEs, CmaEsParameters, CmaEsStop};
