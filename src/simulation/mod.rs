@@ -1,1 +1,11 @@
 //! One case: perturb, move, wires, warp, views, fluoroscopy, picks, annotations. Holds the truth.
+
+pub mod noise;
+pub mod pick;
+pub mod views;
+
+#[cfg(test)]
+mod testing;
+
+pub use pick::{Pick, PickParameters};
+pub use views::{ViewParameters, Views};
