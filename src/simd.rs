@@ -53,32 +53,33 @@ impl SimdLevel {
 /// calls the one asked for:
 ///
 /// `for_simd_level! { fn row_sums(image: &Image, sums: &mut [f64]) = row_sums_loops; }` makes
-/// `fn row_sums(level: SimdLevel, image: &Image, sums: &mut [f64])`.
+/// `fn row_sums(level: SimdLevel, image: &Image, sums: &mut [f64])`. One const parameter may
+/// follow the name.
 ///
 /// The compiler neither contracts nor reorders floating-point operations, so loops without
 /// explicit FMA give the same bits at every level.
 ///
 /// The function made panics when the processor lacks the level.
 macro_rules! for_simd_level {
-    ($(#[$attribute:meta])* $visibility:vis fn $name:ident(
+    ($(#[$attribute:meta])* $visibility:vis fn $name:ident $(<const $constant:ident: $kind:ty>)? (
         $($argument:ident: $type:ty),* $(,)?
-    ) $(-> $result:ty)? = $loops:path;) => {
+    ) $(-> $result:ty)? = $loops:ident;) => {
         $(#[$attribute])*
-        $visibility fn $name(
+        $visibility fn $name $(<const $constant: $kind>)? (
             level: $crate::simd::SimdLevel,
             $($argument: $type),*
         ) $(-> $result)? {
             #[cfg(target_arch = "x86_64")]
             #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-            fn avx2($($argument: $type),*) $(-> $result)? {
-                $loops($($argument),*)
+            fn avx2 $(<const $constant: $kind>)? ($($argument: $type),*) $(-> $result)? {
+                $loops $(::<$constant>)? ($($argument),*)
             }
             #[cfg(target_arch = "x86_64")]
             #[target_feature(
                 enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512bw,avx512cd,avx512dq,avx512vl"
             )]
-            fn avx512($($argument: $type),*) $(-> $result)? {
-                $loops($($argument),*)
+            fn avx512 $(<const $constant: $kind>)? ($($argument: $type),*) $(-> $result)? {
+                $loops $(::<$constant>)? ($($argument),*)
             }
             assert!(
                 level.is_available(),
@@ -88,11 +89,15 @@ macro_rules! for_simd_level {
                 #[cfg(target_arch = "x86_64")]
                 // SAFETY: the processor has the level, as asserted above; every processor with
                 // AVX2 has the bit-manipulation instructions.
-                $crate::simd::SimdLevel::Avx2 => unsafe { avx2($($argument),*) },
+                $crate::simd::SimdLevel::Avx2 => unsafe {
+                    avx2 $(::<$constant>)? ($($argument),*)
+                },
                 #[cfg(target_arch = "x86_64")]
                 // SAFETY: the processor has the level, as asserted above.
-                $crate::simd::SimdLevel::Avx512 => unsafe { avx512($($argument),*) },
-                _ => $loops($($argument),*),
+                $crate::simd::SimdLevel::Avx512 => unsafe {
+                    avx512 $(::<$constant>)? ($($argument),*)
+                },
+                _ => $loops $(::<$constant>)? ($($argument),*),
             }
         }
     };

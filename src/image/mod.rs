@@ -1,6 +1,7 @@
 //! 2D images: filters, PNG and drawing.
 
 pub mod filter;
+pub mod gradient;
 mod image2d;
 mod rect;
 
