@@ -1,50 +1,112 @@
 //! Which vector instructions the hot loops use.
 
 use serde::{Deserialize, Serialize};
+use std::sync::OnceLock;
+use thiserror::Error;
 
-/// A set of vector instructions. A study resolves its level once, stores it, and refuses a node
-/// that lacks it (DESIGN section 4.1).
+/// A level of vector instructions. Results may differ between levels in the last digits, never
+/// within one: a study stores its level and keeps it (DESIGN section 4, point 1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SimdLevel {
-    /// What every processor of the target has.
+    /// Plain Rust, any processor.
     Portable,
-    /// AVX2 and FMA (x86-64-v3).
+    /// x86-64 with AVX2 and FMA.
     Avx2,
-    /// AVX-512 F, BW, CD, DQ and VL (x86-64-v4).
+    /// x86-64 with AVX-512 F, BW, DQ, VL and VNNI.
     Avx512,
 }
 
+/// A level could not be selected.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum SimdError {
+    #[error(
+        "the vector level `{wanted}` needs instructions that this processor lacks (it has \
+         `{available}`): use a node that has them, or a study of its own with `{available}`"
+    )]
+    Unavailable {
+        wanted: &'static str,
+        available: &'static str,
+    },
+    #[error(
+        "the vector level is already `{current}` in this process and cannot become `{wanted}`: \
+         select it before the first volume is prepared"
+    )]
+    Fixed {
+        wanted: &'static str,
+        current: &'static str,
+    },
+}
+
+static CURRENT: OnceLock<SimdLevel> = OnceLock::new();
+
 impl SimdLevel {
-    /// All levels, lowest first.
+    /// All levels, the plainest first.
     pub const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Avx512];
 
-    /// The highest level that this processor has.
-    pub fn best() -> Self {
-        Self::ALL
-            .into_iter()
-            .rfind(|level| level.is_available())
-            .unwrap_or(Self::Portable)
+    /// The highest level of this processor.
+    pub fn detect() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        {
+            use std::arch::is_x86_feature_detected as has;
+            if has!("avx512f")
+                && has!("avx512bw")
+                && has!("avx512dq")
+                && has!("avx512vl")
+                && has!("avx512vnni")
+                && has!("avx2")
+                && has!("fma")
+            {
+                return Self::Avx512;
+            }
+            if has!("avx2") && has!("fma") {
+                return Self::Avx2;
+            }
+        }
+        Self::Portable
     }
 
-    /// True when this processor has the level.
-    #[inline]
-    pub fn is_available(self) -> bool {
+    /// The levels that this processor can run, the plainest first.
+    pub fn available() -> impl Iterator<Item = Self> {
+        let highest = Self::detect();
+        Self::ALL.into_iter().filter(move |&level| level <= highest)
+    }
+
+    /// Fixes the level of this process, before anything has asked for it. Selecting the level that
+    /// already holds is no error.
+    ///
+    /// # Errors
+    /// When the processor lacks the instructions, or another level is already in use.
+    pub fn select(level: Self) -> Result<(), SimdError> {
+        if level > Self::detect() {
+            return Err(SimdError::Unavailable {
+                wanted: level.name(),
+                available: Self::detect().name(),
+            });
+        }
+        let current = *CURRENT.get_or_init(|| level);
+        if current == level {
+            Ok(())
+        } else {
+            Err(SimdError::Fixed {
+                wanted: level.name(),
+                current: current.name(),
+            })
+        }
+    }
+
+    /// The level of this process: the selected one, or else the highest of the processor, from the
+    /// first call on.
+    pub fn current() -> Self {
+        *CURRENT.get_or_init(Self::detect)
+    }
+
+    /// `portable`, `avx2` or `avx512`, as in configurations.
+    pub fn name(self) -> &'static str {
         match self {
-            Self::Portable => true,
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx512 => {
-                Self::Avx2.is_available()
-                    && is_x86_feature_detected!("avx512f")
-                    && is_x86_feature_detected!("avx512bw")
-                    && is_x86_feature_detected!("avx512cd")
-                    && is_x86_feature_detected!("avx512dq")
-                    && is_x86_feature_detected!("avx512vl")
-            }
-            #[cfg(not(target_arch = "x86_64"))]
-            _ => false,
+            Self::Portable => "portable",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
         }
     }
 }
@@ -70,25 +132,25 @@ macro_rules! for_simd_level {
             $($argument: $type),*
         ) $(-> $result)? {
             #[cfg(target_arch = "x86_64")]
-            #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+            #[target_feature(enable = "avx2,fma")]
             fn avx2 $(<const $constant: $kind>)? ($($argument: $type),*) $(-> $result)? {
                 $loops $(::<$constant>)? ($($argument),*)
             }
             #[cfg(target_arch = "x86_64")]
             #[target_feature(
-                enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512bw,avx512cd,avx512dq,avx512vl"
+                enable = "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl"
             )]
             fn avx512 $(<const $constant: $kind>)? ($($argument: $type),*) $(-> $result)? {
                 $loops $(::<$constant>)? ($($argument),*)
             }
             assert!(
-                level.is_available(),
-                "this processor lacks the vector instructions of level {level:?}"
+                level <= $crate::simd::SimdLevel::detect(),
+                "this processor lacks the vector level {}",
+                level.name()
             );
             match level {
                 #[cfg(target_arch = "x86_64")]
-                // SAFETY: the processor has the level, as asserted above; every processor with
-                // AVX2 has the bit-manipulation instructions.
+                // SAFETY: the processor has the level, as asserted above.
                 $crate::simd::SimdLevel::Avx2 => unsafe {
                     avx2 $(::<$constant>)? ($($argument),*)
                 },
@@ -121,19 +183,20 @@ mod tests {
 
     #[test]
     fn every_available_level_runs() {
-        for level in SimdLevel::ALL.into_iter().filter(|l| l.is_available()) {
+        for level in SimdLevel::available() {
             let mut values: Vec<f32> = (0..37).map(|i| i as f32).collect();
             double(level, &mut values);
             assert!(values.iter().enumerate().all(|(i, &v)| v == 2.0 * i as f32));
         }
-        assert!(SimdLevel::best().is_available());
     }
 
     #[test]
-    fn a_level_is_written_in_small_letters() {
-        assert_eq!(
-            serde_json::to_string(&SimdLevel::Avx512).unwrap(),
-            "\"avx512\""
-        );
+    fn the_selected_level_stays() {
+        let current = SimdLevel::current();
+        assert_eq!(SimdLevel::select(current), Ok(()));
+        for other in SimdLevel::ALL.into_iter().filter(|&l| l != current) {
+            assert!(SimdLevel::select(other).is_err(), "{}", other.name());
+        }
+        assert_eq!(SimdLevel::current(), current);
     }
 }

@@ -49,7 +49,7 @@ impl GaussianKernel {
 
 /// The image smoothed along its columns, then along its rows.
 pub fn gaussian(image: &Image<f32>, kernel: &GaussianKernel) -> Image<f32> {
-    gaussian_at(SimdLevel::best(), image, kernel)
+    gaussian_at(SimdLevel::current(), image, kernel)
 }
 
 for_simd_level! {

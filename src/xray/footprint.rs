@@ -2,38 +2,13 @@
 
 use super::Camera;
 use crate::geometry::{Point, Rigid};
+pub use crate::image::PixelRect;
 use crate::volume::Volume;
-
-/// A rectangle of pixels: columns `x0..x1`, rows `y0..y1`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PixelRect {
-    pub x0: usize,
-    pub y0: usize,
-    /// One past the last column.
-    pub x1: usize,
-    /// One past the last row.
-    pub y1: usize,
-}
 
 impl PixelRect {
     /// The whole image of a camera.
     pub fn full(camera: &Camera) -> Self {
-        Self {
-            x0: 0,
-            y0: 0,
-            x1: camera.width,
-            y1: camera.height,
-        }
-    }
-
-    /// Number of columns.
-    pub fn width(&self) -> usize {
-        self.x1 - self.x0
-    }
-
-    /// Number of rows.
-    pub fn height(&self) -> usize {
-        self.y1 - self.y0
+        Self::of_image(camera.width, camera.height)
     }
 }
 

@@ -7,13 +7,12 @@ pub mod footprint;
 mod kernel;
 mod rays;
 pub mod reference;
-pub mod simd;
 
+pub use crate::simd::SimdLevel;
 pub use attenuation::AttenuationParameters;
 pub use bone::BoneVolume;
 pub use camera::{Camera, Orbit};
 pub use footprint::PixelRect;
-pub use simd::SimdLevel;
 
 #[cfg(test)]
 mod projection_tests;
