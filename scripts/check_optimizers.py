@@ -70,4 +70,4 @@ for r in (r for r in rows if r["method"] == "bobyqa"):
     failed |= tolerance < 1e-6 and abs(float(r["cost"]) - theirs) > 1e-3
     print(f"bowl n {n:2d} tolerance {tolerance:g}: ours {float(r['cost']):.9f} in {r['evaluations']} evaluations, "
           f"NLopt {theirs:.9f} in {opt.get_numevals()}")
-sys.exit(failed)
+sys.exit(bool(failed))

@@ -1,5 +1,6 @@
 //! All that a registration may know.
 
+use super::models::ModelRecipe;
 use crate::anatomy::Hip;
 use crate::geometry::{Pixel, Point};
 use crate::image::Image;
@@ -39,6 +40,8 @@ pub enum Shape {
         femur: Arc<BoneVolume>,
         nominal: CutPlanes,
         annotations: Arc<Vec<CutAnnotation>>,
+        /// How the models of the estimated shape are made.
+        recipe: ModelRecipe,
     },
 }
 
