@@ -4,5 +4,11 @@ pub mod components;
 pub mod distance;
 pub mod grid;
 pub mod morphology;
+pub mod surface;
+mod surface_field;
+mod surface_nets;
+pub mod surface_query;
 
 pub use grid::{Grid, Volume};
+pub use surface::{Surface, SurfaceParameters};
+pub use surface_query::Hit;
