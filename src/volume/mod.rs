@@ -8,7 +8,9 @@ pub mod surface;
 mod surface_field;
 mod surface_nets;
 pub mod surface_query;
+pub mod nifti;
 
+pub use self::nifti::{NiftiFileError, read_nifti, write_nifti};
 pub use grid::{Grid, Volume};
 pub use surface::{Surface, SurfaceParameters};
 pub use surface_query::Hit;

@@ -1,0 +1,15 @@
+//! Volumes as NIfTI-1 files (`.nii`, `.nii.gz`).
+//!
+//! A NIfTI world is RAS, ours is LPS: x and y change their sign here, in both directions, and
+//! nowhere else.
+
+mod affine;
+mod error;
+mod read;
+mod voxel;
+mod write;
+
+pub use error::NiftiFileError;
+pub use read::read_nifti;
+pub use voxel::{NiftiVoxel, VoxelProblem};
+pub use write::write_nifti;
