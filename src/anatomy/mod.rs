@@ -1,15 +1,19 @@
 //! Specimens: CT, labels, landmarks, rims; their anatomical frames; where they come from.
 
+pub mod disk;
 pub mod frame;
 pub mod label;
 pub mod landmark;
 pub mod lce;
+pub mod problem;
 pub mod side;
 pub mod specimen;
 
+pub use disk::{SpecimenError, read_specimen, write_specimen};
 pub use frame::Hip;
 pub use label::Label;
 pub use landmark::{Landmark, Landmarks};
 pub use lce::{LceApex, lce_angle};
+pub use problem::{SpecimenProblem, specimen_problems};
 pub use side::Side;
 pub use specimen::{Source, Specimen};
