@@ -4,11 +4,11 @@ pub mod components;
 pub mod distance;
 pub mod grid;
 pub mod morphology;
+pub mod nifti;
 pub mod surface;
 mod surface_field;
 mod surface_nets;
 pub mod surface_query;
-pub mod nifti;
 
 pub use self::nifti::{NiftiFileError, read_nifti, write_nifti};
 pub use grid::{Grid, Volume};
