@@ -3,9 +3,11 @@
 pub mod noise;
 pub mod pick;
 pub mod views;
+pub mod warp;
 
 #[cfg(test)]
 mod testing;
 
 pub use pick::{Pick, PickParameters};
 pub use views::{ViewParameters, Views};
+pub use warp::{MovedAnatomy, WarpParameters};
