@@ -1,6 +1,7 @@
 //! The fragment that four cuts free: the label map of the paper's section "Preoperative Processing
 //! and Planning".
 
+use super::ranges::out_of_range;
 use super::{Cut, CutPlanes};
 use crate::anatomy::{Hip, Label, Landmark, frame::FrameError};
 use crate::geometry::{Plane, Point, Vector};
@@ -33,26 +34,15 @@ impl Default for FragmentParameters {
 impl FragmentParameters {
     /// Fields out of range, with what is expected.
     pub fn problems(&self) -> Vec<(String, String)> {
-        let mut problems = Vec::new();
-        if !(0.0..=10.0).contains(&self.chisel_width_mm) {
-            problems.push((
-                "chisel_width_mm".into(),
-                format!(
-                    "is {}; expected a width from 0 to 10 mm",
-                    self.chisel_width_mm
-                ),
-            ));
-        }
-        if !(30.0..=300.0).contains(&self.lateral_limit_mm) {
-            problems.push((
-                "lateral_limit_mm".into(),
-                format!(
-                    "is {}; expected 30 to 300 mm, lateral of the acetabulum",
-                    self.lateral_limit_mm
-                ),
-            ));
-        }
-        problems
+        out_of_range(&[
+            ("chisel_width_mm", self.chisel_width_mm, 0.0..=10.0, " mm"),
+            (
+                "lateral_limit_mm",
+                self.lateral_limit_mm,
+                30.0..=300.0,
+                " mm",
+            ),
+        ])
     }
 }
 
