@@ -1,7 +1,19 @@
 //! The cost of candidate poses: similarity, regularization and the scorer.
 
+mod comparison;
+pub mod cpu_scorer;
+#[cfg(test)]
+mod direct;
+pub mod drr;
+mod patch_cost;
+mod patch_sums;
 pub mod regularization;
 pub mod scorer;
+pub mod similarity;
+mod view_cost;
 
+pub use cpu_scorer::{CpuScorer, ScorerParameters, ScorerView, Views};
+pub use drr::drr;
 pub use regularization::Regularization;
 pub use scorer::Scorer;
+pub use similarity::{FixedView, FixedViewError, SimilarityParameters};

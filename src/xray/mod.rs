@@ -5,6 +5,7 @@ pub mod bone;
 pub mod camera;
 pub mod footprint;
 mod kernel;
+pub mod pyramid;
 mod rays;
 pub mod reference;
 
