@@ -1,5 +1,6 @@
 //! One case: perturb, move, wires, warp, views, fluoroscopy, picks, annotations. Holds the truth.
 
+pub mod fluoroscopy;
 pub mod noise;
 pub mod pick;
 pub mod views;
@@ -8,6 +9,7 @@ pub mod warp;
 #[cfg(test)]
 mod testing;
 
+pub use fluoroscopy::{FluoroscopyParameters, fluoroscopy};
 pub use pick::{Pick, PickParameters};
 pub use views::{ViewParameters, Views};
 pub use warp::{MovedAnatomy, WarpParameters};
