@@ -1,6 +1,8 @@
 //! Tables, figures and the page that a study ends in.
 
+pub mod canvas;
 pub mod errors_table;
+pub mod histograms;
 pub mod offsets_table;
 pub mod reference;
 pub mod rows;
