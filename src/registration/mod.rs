@@ -4,6 +4,7 @@ pub mod models;
 pub mod observation;
 pub mod outcome;
 
+pub mod paper;
 pub mod pose_space;
 pub mod stage;
 pub mod strategy;
@@ -12,4 +13,5 @@ pub use models::ModelRecipe;
 pub use observation::{BoneModels, Observation, ObservedView, Shape};
 pub use outcome::{Outcome, ShapeOutcome, StageRecord};
 
+pub use paper::{Paper, PaperParameters};
 pub use strategy::{RegistrationError, Strategy};

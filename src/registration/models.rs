@@ -3,7 +3,7 @@
 use super::observation::BoneModels;
 use crate::anatomy::{Hip, Label};
 use crate::surgery::CutPlanes;
-use crate::surgery::fragment::{FragmentError, FragmentParameters, SurgeryMap, cut_fragment};
+use crate::surgery::fragment::{FragmentError, FragmentParameters, carve, cut_fragment};
 use crate::volume::Volume;
 use crate::xray::{AttenuationParameters, BoneVolume};
 use std::sync::Arc;
@@ -31,25 +31,30 @@ pub enum ModelError {
 }
 
 impl ModelRecipe {
-    /// Pelvis, femur and fragment for given cuts.
+    /// Pelvis and fragment for given cuts, with the ipsilateral femur's model.
     ///
     /// # Errors
     /// When the cuts free no fragment or an object has no voxel.
-    pub fn models(&self, hip: &Hip, cuts: &CutPlanes) -> Result<BoneModels, ModelError> {
+    pub fn models(
+        &self,
+        hip: &Hip,
+        femur: &Arc<BoneVolume>,
+        cuts: &CutPlanes,
+    ) -> Result<BoneModels, ModelError> {
         let map = cut_fragment(hip, cuts, &self.fragment)?;
-        self.models_of_map(hip, &map)
-    }
-
-    /// Pelvis, femur and fragment of a label map that is already cut.
-    ///
-    /// # Errors
-    /// When an object has no voxel.
-    pub fn models_of_map(&self, hip: &Hip, map: &SurgeryMap) -> Result<BoneModels, ModelError> {
         Ok(BoneModels {
             pelvis: self.bone(hip, &map.labels, Label::Pelvis, "pelvis")?,
-            femur: self.femur(hip)?,
+            femur: Arc::clone(femur),
             fragment: self.bone(hip, &map.labels, Label::Fragment, "fragment")?,
         })
+    }
+
+    /// Whether cuts free a fragment at all, or why not.
+    pub fn plausible(&self, hip: &Hip, cuts: &CutPlanes) -> Result<(), String> {
+        match carve(hip, cuts, &self.fragment) {
+            Ok(_) => Ok(()),
+            Err(error) => Err(error.to_string()),
+        }
     }
 
     /// The ipsilateral femur.

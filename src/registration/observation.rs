@@ -6,6 +6,7 @@ use crate::geometry::{Pixel, Point};
 use crate::image::Image;
 use crate::shape_estimation::CutAnnotation;
 use crate::surgery::CutPlanes;
+use crate::volume::Surface;
 use crate::xray::{BoneVolume, Camera, Orbit};
 use std::sync::Arc;
 
@@ -38,6 +39,8 @@ pub enum Shape {
         /// The whole pelvis, fragment included, for the single views.
         full_pelvis: Arc<BoneVolume>,
         femur: Arc<BoneVolume>,
+        /// Surface of the whole pelvis, in the world of the preoperative CT.
+        pelvis_surface: Arc<Surface>,
         nominal: CutPlanes,
         annotations: Arc<Vec<CutAnnotation>>,
         /// How the models of the estimated shape are made.

@@ -3,7 +3,9 @@
 use super::models::ModelError;
 use super::{Observation, Outcome};
 use crate::anatomy::frame::FrameError;
+use crate::objective::FixedViewError;
 use crate::optimize::BoxError;
+use crate::xray::pyramid::PyramidError;
 
 /// A registration method. It sees an observation and nothing else, and its result is a pure
 /// function of it.
@@ -39,4 +41,8 @@ pub enum RegistrationCause {
     NoFiniteCost,
     #[error(transparent)]
     Model(#[from] ModelError),
+    #[error(transparent)]
+    Reduction(#[from] PyramidError),
+    #[error(transparent)]
+    FixedView(#[from] FixedViewError),
 }

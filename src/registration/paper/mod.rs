@@ -1,0 +1,11 @@
+//! The strategy `paper`: the method of Grupp et al. to the letter.
+
+mod initialization;
+mod multi_view;
+mod parameters;
+mod pipeline;
+mod single_view;
+mod views;
+
+pub use parameters::{MultiViewParameters, PaperParameters, SingleViewParameters};
+pub use pipeline::Paper;
