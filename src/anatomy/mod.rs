@@ -6,6 +6,8 @@ pub mod label;
 pub mod landmark;
 pub mod lce;
 pub mod problem;
+pub mod mirror;
+pub mod phantom;
 pub mod side;
 pub mod specimen;
 
@@ -15,5 +17,7 @@ pub use label::Label;
 pub use landmark::{Landmark, Landmarks};
 pub use lce::{LceApex, lce_angle};
 pub use problem::{SpecimenProblem, specimen_problems};
+pub use mirror::mirror;
+pub use phantom::{PhantomParameters, phantom};
 pub use side::Side;
 pub use specimen::{Source, Specimen};

@@ -1,1 +1,20 @@
-//! Built-in phantom bodies.
+//! Built-in phantom bodies: parametric shapes, drawn at random, voxelized to specimens.
+
+mod acetabulum;
+mod bone_density;
+mod build;
+mod distance;
+mod femur;
+mod hip_bone;
+mod noise;
+mod parameters;
+mod sacrum;
+mod skeleton;
+mod soft_tissue;
+#[cfg(test)]
+mod tests;
+mod voxelize;
+mod wing;
+
+pub use parameters::PhantomParameters;
+pub use voxelize::phantom;
