@@ -41,43 +41,35 @@ impl Occupancy {
             dims: cells,
             distance,
         };
-        // The Chebyshev distance is the largest over the axes, so it can be found one axis after
-        // the other by two sweeps of "at most one more than the neighbour" only if diagonals count
-        // as one: repeated dilation by a cube is exact and separable.
         occupancy.fill_distances();
         occupancy
     }
 
+    /// Two sweeps in which each cell is at most one further than its neighbours that came before:
+    /// exact for the Chebyshev distance, where all 26 neighbours are at distance one.
     fn fill_distances(&mut self) {
-        let [nx, ny, nz] = self.dims;
-        let mut reached: Vec<bool> = self.distance.iter().map(|&d| d == 0).collect();
-        let mut next = reached.clone();
-        for step in 1..u8::MAX {
-            for (axis, stride) in [(0, 1), (1, nx), (2, nx * ny)] {
-                for (at, flag) in next.iter_mut().enumerate() {
-                    let along = match axis {
-                        0 => at % nx,
-                        1 => at / nx % ny,
-                        _ => at / (nx * ny),
-                    };
-                    let last = [nx, ny, nz][axis] - 1;
-                    *flag = reached[at]
-                        || along > 0 && reached[at - stride]
-                        || along < last && reached[at + stride];
+        let [nx, ny, nz] = self.dims.map(|n| n as isize);
+        // The 13 neighbours that precede a cell in memory; the other 13 are their opposites.
+        let before: Vec<[isize; 3]> = (0..13)
+            .map(|n| [n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1])
+            .collect();
+        let mut sweep = |sign: isize| {
+            for at in 0..nx * ny * nz {
+                let at = if sign > 0 { at } else { nx * ny * nz - 1 - at };
+                let cell = [at % nx, at / nx % ny, at / (nx * ny)];
+                let mut distance = self.distance[at as usize];
+                for step in &before {
+                    let [x, y, z]: [isize; 3] = std::array::from_fn(|a| cell[a] + sign * step[a]);
+                    if (0..nx).contains(&x) && (0..ny).contains(&y) && (0..nz).contains(&z) {
+                        let neighbour = self.distance[((z * ny + y) * nx + x) as usize];
+                        distance = distance.min(neighbour.saturating_add(1));
+                    }
                 }
-                std::mem::swap(&mut reached, &mut next);
+                self.distance[at as usize] = distance;
             }
-            let mut changed = false;
-            for (d, &r) in self.distance.iter_mut().zip(&reached) {
-                if r && *d == u8::MAX {
-                    *d = step;
-                    changed = true;
-                }
-            }
-            if !changed {
-                break;
-            }
-        }
+        };
+        sweep(1);
+        sweep(-1);
     }
 }
 
