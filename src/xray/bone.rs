@@ -1,7 +1,7 @@
 //! A bone's attenuation volume, prepared for projection.
 
 use super::footprint::{Hull, PixelRect};
-use super::kernel::{KernelVolume, portable};
+use super::kernel::{KernelVolume, Projection};
 use super::rays::IndexRays;
 use super::{AttenuationParameters, Camera, SimdLevel};
 use crate::geometry::Rigid;
@@ -133,7 +133,7 @@ impl BoneVolume {
         );
         assert!(step_mm > 0.0, "step is {step_mm} mm; expected above 0");
         let rays = IndexRays::new(camera, camera_from_volume, &self.attenuation.grid);
-        portable::project_add(&self.kernel, &rays, step_mm, rect, camera.width, out);
+        Projection::new(&self.kernel, rays, step_mm, rect, camera.width).add(self.simd, out);
     }
 }
 

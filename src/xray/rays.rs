@@ -19,6 +19,8 @@ pub(crate) struct IndexRays {
     pub column: Vector,
     /// What one row adds to `axis`.
     pub row: Vector,
+    /// Depth of index zero, and what one index along each axis adds.
+    depth: (f64, Vector),
     camera: Camera,
 }
 
@@ -40,6 +42,13 @@ impl IndexRays {
             )),
             column: linear(Vector::new(pixel, 0.0, 0.0)),
             row: linear(Vector::new(0.0, pixel, 0.0)),
+            depth: (
+                -(camera_from_volume * grid.origin).z,
+                Vector::from_fn(|axis, _| {
+                    let along = grid.direction.column(axis) * grid.spacing[axis];
+                    -(camera_from_volume.rotation * along).z
+                }),
+            ),
             camera: *camera,
         }
     }
@@ -58,6 +67,16 @@ impl IndexRays {
         let x = (u as f64 - self.camera.principal.x) * pixel;
         let y = (v as f64 - self.camera.principal.y) * pixel;
         (1.0 + x * x + y * y).sqrt()
+    }
+
+    /// Depth in mm of the farthest corner of a grid of this many voxels, at most the detector's.
+    pub fn farthest_mm(&self, dims: [usize; 3]) -> f64 {
+        let (zero, per_index) = self.depth;
+        let farthest = zero
+            + (0..3)
+                .map(|a| (per_index[a] * (dims[a] as f64 - 1.0)).max(0.0))
+                .sum::<f64>();
+        farthest.clamp(0.0, self.camera.source_detector_mm)
     }
 
     /// The depths between which the ray with this slope lies in the box of indices `min..=max` and
@@ -79,15 +98,6 @@ impl IndexRays {
         }
         (enter <= leave).then_some((enter, leave))
     }
-}
-
-/// The numbers of the samples, `first..end`, that lie at depths `enter..=leave`: sample k lies at
-/// depth `k * step_mm`.
-#[inline]
-pub(crate) fn samples_between(enter: f64, leave: f64, step_mm: f64) -> (u32, u32) {
-    let first = (enter / step_mm).ceil().max(0.0) as u32;
-    let end = (leave / step_mm).floor().max(-1.0) + 1.0;
-    (first, end as u32)
 }
 
 #[cfg(test)]

@@ -1,7 +1,12 @@
 //! The loops that project bones: one file for each level of vector instructions.
 
-pub(crate) mod occupancy;
-pub(crate) mod portable;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+mod fixed;
+mod occupancy;
+mod portable;
+mod projection;
 mod volume;
 
+pub(crate) use projection::Projection;
 pub(crate) use volume::KernelVolume;

@@ -1,13 +1,16 @@
 //! Where a volume is empty, so that rays can leap.
 
+/// Bytes after the table, so that 32 bits can be loaded from the place of any cell.
+const PADDING: usize = 3;
+
 /// The distance of each cell of 4 x 4 x 4 voxels from the nearest cell that holds something.
 #[derive(Clone, Debug)]
 pub(crate) struct Occupancy {
     /// Number of cells along each axis.
     pub dims: [usize; 3],
     /// Chebyshev distance in cells, i fastest: 0 where interpolation inside the cell can be other
-    /// than zero.
-    pub distance: Vec<u8>,
+    /// than zero. After the last cell come [`PADDING`] bytes.
+    distance: Vec<u8>,
 }
 
 impl Occupancy {
@@ -18,14 +21,14 @@ impl Occupancy {
 
     /// Of voxels stored i fastest. A cell holds the positions from its first voxel up to (and
     /// without) the first of the next, so its interpolation reads one layer of the next cells too.
-    pub fn new(dims: [usize; 3], voxels: &[i16]) -> Self {
+    pub fn new(dims: [usize; 3], voxels: &[[i16; 2]]) -> Self {
         let cells = dims.map(|n| n.div_ceil(Self::EDGE));
         let index = |c: [usize; 3]| (c[2] * cells[1] + c[1]) * cells[0] + c[0];
-        let mut distance = vec![u8::MAX; cells.iter().product()];
+        let mut distance = vec![u8::MAX; cells.iter().product::<usize>() + PADDING];
         for k in 0..dims[2] {
             for j in 0..dims[1] {
                 let row = &voxels[(k * dims[1] + j) * dims[0]..][..dims[0]];
-                for (i, _) in row.iter().enumerate().filter(|&(_, &v)| v != 0) {
+                for (i, _) in row.iter().enumerate().filter(|&(_, v)| v[0] != 0) {
                     // A voxel is read from its own cell and, when first in it, from the one below.
                     for z in k.saturating_sub(1) >> Self::SHIFT..=k >> Self::SHIFT {
                         for y in j.saturating_sub(1) >> Self::SHIFT..=j >> Self::SHIFT {
@@ -43,6 +46,17 @@ impl Occupancy {
         };
         occupancy.fill_distances();
         occupancy
+    }
+
+    /// The distances of all cells and at least three bytes after them.
+    pub fn padded(&self) -> &[u8] {
+        &self.distance
+    }
+
+    /// The distance of a cell.
+    #[inline(always)]
+    pub fn at(&self, cell: [usize; 3]) -> u8 {
+        self.distance[(cell[2] * self.dims[1] + cell[1]) * self.dims[0] + cell[0]]
     }
 
     /// Two sweeps in which each cell is at most one further than its neighbours that came before:
@@ -80,9 +94,9 @@ mod tests {
     #[test]
     fn distances_are_chebyshev_distances_to_what_interpolation_reads() {
         let dims = [21, 17, 26];
-        let mut voxels = vec![0i16; dims.iter().product()];
+        let mut voxels = vec![[0i16; 2]; dims.iter().product()];
         for [i, j, k] in [[4, 5, 6], [19, 0, 25], [7, 8, 8]] {
-            voxels[(k * dims[1] + j) * dims[0] + i] = 3;
+            voxels[(k * dims[1] + j) * dims[0] + i][0] = 3;
         }
         let o = Occupancy::new(dims, &voxels);
         assert_eq!(o.dims, [6, 5, 7]);
@@ -94,7 +108,7 @@ mod tests {
                 sources.push([1, j, k]);
             }
         }
-        for (at, &d) in o.distance.iter().enumerate() {
+        for (at, &d) in o.distance[..6 * 5 * 7].iter().enumerate() {
             let c = [at % 6, at / 6 % 5, at / 30];
             let expected = sources
                 .iter()

@@ -1,85 +1,88 @@
 //! The plain loop: one ray after the other, leaping over empty cells.
 
-use super::KernelVolume;
+use super::Projection;
+use super::fixed::{BITS, CHUNK, TILE, WEIGHT_BITS, WEIGHT_ONE, weight};
 use super::occupancy::Occupancy;
-use crate::xray::PixelRect;
-use crate::xray::rays::{IndexRays, samples_between};
 
-/// Adds the line integrals of `rays` to the pixels `rect` of `out`, an image of `width` columns.
-pub(crate) fn project_add(
-    volume: &KernelVolume,
-    rays: &IndexRays,
-    step_mm: f64,
-    rect: PixelRect,
-    width: usize,
-    out: &mut [f32],
-) {
-    for v in rect.y0..rect.y1 {
-        for u in rect.x0..rect.x1 {
-            let slope = rays.slope(u, v);
-            let Some((enter, leave)) = rays.clip(&slope, &volume.min, &volume.max) else {
-                continue;
-            };
-            let (first, end) = samples_between(enter, leave, step_mm);
-            if first >= end {
-                continue;
+/// Adds the line integrals of a projection's pixels to `out`.
+pub(crate) fn project_add(job: &Projection, out: &mut [f32]) {
+    for v in job.rect.y0..job.rect.y1 {
+        for u in job.rect.x0..job.rect.x1 {
+            let sum = ray_sum(job, u, v);
+            if sum != 0 {
+                out[v * job.width + u] += sum as f32 * job.scale(u, v);
             }
-            // The first sample in f64, so that the long way from the source costs no digits; the
-            // few hundred steps inside the box then do well in f32.
-            let start = rays.source + slope * (f64::from(first) * step_mm);
-            let sum = ray_sum(
-                volume,
-                std::array::from_fn(|a| start[a] as f32),
-                std::array::from_fn(|a| (slope[a] * step_mm) as f32),
-                end - first,
-            );
-            let scale = f64::from(volume.unit) * step_mm * rays.length_per_depth(u, v);
-            out[v * width + u] += (f64::from(sum) * scale) as f32;
         }
     }
 }
 
-/// The sum of `count` samples from index `start` on, `step` apart, in units of the voxels.
-fn ray_sum(volume: &KernelVolume, start: [f32; 3], step: [f32; 3], count: u32) -> f32 {
-    let limit: [f32; 3] = [
-        volume.max.x as f32,
-        volume.max.y as f32,
-        volume.max.z as f32,
-    ];
-    let fastest = step[0].abs().max(step[1].abs()).max(step[2].abs());
-    let steps_per_cell = Occupancy::EDGE as f32 / fastest;
-    let row = volume.dims[0];
-    let slice = row * volume.dims[1];
-    let cells = &volume.occupancy;
-    let mut sum = 0.0f32;
-    let mut k = 0;
-    while k < count {
-        // Rounding may leave the first or last sample a hair outside the box.
-        let p: [f32; 3] =
-            std::array::from_fn(|a| (start[a] + k as f32 * step[a]).clamp(0.0, limit[a]));
-        let at = p.map(|x| x as usize);
-        let cell = at.map(|x| x >> Occupancy::SHIFT);
-        let distance =
-            cells.distance[(cell[2] * cells.dims[1] + cell[1]) * cells.dims[0] + cell[0]];
+/// The sum of all samples of one ray, each shifted right by `job.shift`.
+fn ray_sum(job: &Projection, u: usize, v: usize) -> i32 {
+    let volume = job.volume;
+    let Some((first, end)) = job.samples(job.rays.slope(u, v), 0.0) else {
+        return 0;
+    };
+    let tile = job.fixed.tile(u - u % TILE, v - v % TILE);
+    let (i, j) = ((u % TILE) as i32, (v % TILE) as i32);
+    let (column, row) = job.fixed.step_offsets();
+    let mut step = tile.step();
+    for a in 0..3 {
+        step[a] += i * column[a] + j * row[a];
+    }
+    let fastest = step.iter().map(|s| s.unsigned_abs()).max().unwrap_or(1);
+    let samples_per_cell = (Occupancy::EDGE << BITS) as f32 / fastest as f32;
+    let mut sum = 0;
+    let (mut chunk, mut start) = (u32::MAX, [0; 3]);
+    let mut k = first;
+    while k < end {
+        if k / CHUNK != chunk {
+            chunk = k / CHUNK;
+            let (column, row) = job.fixed.offsets(chunk);
+            start = tile.start(chunk);
+            for a in 0..3 {
+                start[a] = start[a]
+                    .wrapping_add(i.wrapping_mul(column[a]))
+                    .wrapping_add(j.wrapping_mul(row[a]));
+            }
+        }
+        let position: [i32; 3] = std::array::from_fn(|a| {
+            start[a]
+                .wrapping_add((k % CHUNK) as i32 * step[a])
+                .clamp(0, job.last[a])
+        });
+        let cell = position.map(|p| (p >> BITS) as usize >> Occupancy::SHIFT);
+        let distance = volume.occupancy.at(cell);
         if distance > 0 {
             // All cells nearer than `distance` are empty: so far the ray may go from anywhere in
-            // this cell, and at least one step.
-            k += ((f32::from(distance) - 1.0) * steps_per_cell) as u32 + 1;
+            // this cell, and at least one sample.
+            k += ((f32::from(distance) - 1.0) * samples_per_cell) as u32 + 1;
             continue;
         }
-        let f: [f32; 3] = std::array::from_fn(|a| p[a] - at[a] as f32);
-        let base = at[2] * slice + at[1] * row + at[0];
-        let along_i = |offset: usize| {
-            let low = f32::from(volume.voxels[base + offset]);
-            let high = f32::from(volume.voxels[base + offset + 1]);
-            low + f[0] * (high - low)
-        };
-        let (near, far) = (along_i(0), along_i(row));
-        let below = near + f[1] * (far - near);
-        let (near, far) = (along_i(slice), along_i(slice + row));
-        let above = near + f[1] * (far - near);
-        sum += below + f[2] * (above - below);
+        // Negative samples, because that is what fits the vector kernels' instructions.
+        sum -= -sample(job, &position) >> job.shift;
         k += 1;
     }
     sum
+}
+
+/// The interpolated volume at a position, in units of the voxels over [`WEIGHT_ONE`].
+#[inline(always)]
+fn sample(job: &Projection, position: &[i32; 3]) -> i32 {
+    let [nx, ny, _] = job.volume.dims;
+    let voxel = position.map(|p| (p >> BITS) as usize);
+    let weight = position.map(weight);
+    let at = (voxel[2] * ny + voxel[1]) * nx + voxel[0];
+    let pairs = &job.volume.pairs;
+    let between = |low: [i16; 2], high: [i16; 2], weight: i32| -> [i16; 2] {
+        std::array::from_fn(|n| {
+            let difference = i32::from(high[n]) - i32::from(low[n]);
+            let part = (difference * weight + (1 << (WEIGHT_BITS - 1))) >> WEIGHT_BITS;
+            low[n] + part as i16
+        })
+    };
+    let lower = between(pairs[at], pairs[at + 1], weight[0]);
+    let at = at + nx * ny;
+    let upper = between(pairs[at], pairs[at + 1], weight[0]);
+    let pair = between(lower, upper, weight[2]);
+    i32::from(pair[0]) * (WEIGHT_ONE - weight[1]) + i32::from(pair[1]) * weight[1]
 }

@@ -1,22 +1,19 @@
 //! A bone's voxels as the kernels read them.
 
 use super::occupancy::Occupancy;
-use crate::geometry::Vector;
 use crate::volume::Volume;
 
 /// Voxels of 15 bits with one scale, and where they are not zero.
 #[derive(Clone, Debug)]
 pub(crate) struct KernelVolume {
-    /// Number of voxels stored along each axis: those of the volume, and one more zero layer at
-    /// each upper end, so that a sample exactly on the last voxel may read its upper neighbour.
+    /// Number of voxels along each axis.
     pub dims: [usize; 3],
-    /// `dims` values from 0 to [`FULL_SCALE`], i fastest.
-    pub voxels: Vec<i16>,
-    /// Attenuation per mm of one unit of `voxels`.
+    /// Each voxel with its neighbour along j, so that one load of 64 bits gives the four corners
+    /// of a sample that lie on one slice; i fastest. Past the last voxel lie as many zeros as a
+    /// sample on the uppermost slice reads.
+    pub pairs: Vec<[i16; 2]>,
+    /// Attenuation per mm of one unit of the voxels.
     pub unit: f32,
-    /// Box of indices outside which the interpolated volume is zero.
-    pub min: Vector,
-    pub max: Vector,
     pub occupancy: Occupancy,
 }
 
@@ -24,29 +21,42 @@ pub(crate) struct KernelVolume {
 const FULL_SCALE: f32 = 32767.0;
 
 impl KernelVolume {
+    /// The greatest number of voxels along an axis, so that fixed-point positions do not overflow.
+    pub const LARGEST: usize = 960;
+
     /// Prepares a volume that has a zero border and a voxel above zero.
+    ///
+    /// # Panics
+    /// When an axis has more than [`Self::LARGEST`] voxels.
     pub fn new(volume: &Volume<f32>) -> Self {
-        let [nx, ny, nz] = volume.grid.dims;
+        let dims = volume.grid.dims;
+        assert!(
+            dims.iter().all(|&n| n <= Self::LARGEST),
+            "a bone of {dims:?} voxels cannot be projected; expected at most {} along an axis: \
+             resample the CT to larger voxels",
+            Self::LARGEST
+        );
+        let [nx, ny, nz] = dims;
         let largest = volume.data.iter().fold(0.0f32, |a, &b| a.max(b));
-        let dims = [nx + 1, ny + 1, nz + 1];
-        let mut voxels = vec![0i16; dims.iter().product()];
         let per_unit = FULL_SCALE / largest;
+        let mut pairs = vec![[0i16; 2]; nx * ny * (nz + 1) + 2];
         for k in 0..nz {
             for j in 0..ny {
-                let source = &volume.data[volume.grid.offset(0, j, k)..][..nx];
-                let target = &mut voxels[(k * dims[1] + j) * dims[0]..][..nx];
-                for (t, &s) in target.iter_mut().zip(source) {
-                    *t = (s * per_unit).round() as i16;
+                let row = volume.grid.offset(0, j, k);
+                for i in 0..nx {
+                    let value = (volume.data[row + i] * per_unit).round() as i16;
+                    pairs[row + i][0] = value;
+                    if j > 0 {
+                        pairs[row + i - nx][1] = value;
+                    }
                 }
             }
         }
         Self {
-            occupancy: Occupancy::new(dims, &voxels),
+            occupancy: Occupancy::new(dims, &pairs),
             dims,
-            voxels,
+            pairs,
             unit: largest / FULL_SCALE,
-            min: Vector::zeros(),
-            max: Vector::new(nx as f64 - 1.0, ny as f64 - 1.0, nz as f64 - 1.0),
         }
     }
 }
