@@ -72,16 +72,9 @@ fn fit(
 ) -> Result<Plane, String> {
     let points = cut_points(input.pelvis, input.views, input.annotations, cut);
     let kept = prune(&points, input.hip, midline_x(input.hip), cut);
-    if kept.len() < 3 {
-        return Err(format!(
-            "{} of {} points are left after pruning by anatomy, expected 3 or more",
-            kept.len(),
-            points.len()
-        ));
-    }
-    let plane = ransac_plane(&kept, parameters, stream)
-        .ok_or_else(|| format!("no plane agrees with enough of {} points", kept.len()))?
-        .transformed(&input.hip.app_from_volume);
+    let fitted = ransac_plane(&kept, parameters, stream)
+        .map_err(|error| format!("{error} (rays met the pelvis in {} points)", points.len()))?;
+    let plane = fitted.plane.transformed(&input.hip.app_from_volume);
     // The femoral head, the APP's origin, lies inside.
     let outward = match plane.signed_distance(&Point::origin()) > 0.0 {
         true => plane.flipped(),
@@ -246,7 +239,12 @@ mod tests {
             );
             assert!((found.offset_mm - truth.offset_mm).abs() < 1e-4);
             // Nothing marks the pubis, so it stays nominal and says so.
-            assert!(estimated.pubis_fallback.unwrap().contains("0 of 0 points"));
+            assert!(
+                estimated
+                    .pubis_fallback
+                    .unwrap()
+                    .starts_with("0 points are left")
+            );
             assert_eq!(estimated.cuts.get(Cut::Pubis), nominal.get(Cut::Pubis));
         }
     }

@@ -2,7 +2,7 @@
 
 use super::annotation::{Crossing, CutAnnotation};
 use crate::anatomy::{Hip, Side};
-use crate::geometry::{Point, Ray, Rigid};
+use crate::geometry::{Pixel, Point, Ray, Rigid};
 use crate::surgery::Cut;
 use crate::volume::Surface;
 use crate::xray::Camera;
@@ -14,6 +14,18 @@ pub struct RegisteredView {
     pub camera: Camera,
     /// The registered pose of the full pelvis.
     pub camera_from_pelvis: Rigid,
+}
+
+/// The ray of a pixel from the detector towards the source, in the pelvis' frame, with a direction
+/// of unit length.
+pub fn detector_ray(camera: &Camera, camera_from_pelvis: &Rigid, pixel: &Pixel) -> Ray {
+    let pelvis_from_camera = camera_from_pelvis.inverse();
+    let detector = pelvis_from_camera * camera.detector_point(pixel);
+    let source = pelvis_from_camera * Point::origin();
+    Ray {
+        origin: detector,
+        direction: (source - detector).normalize(),
+    }
 }
 
 /// The points, in the world of the CT, where annotated rays of one cut meet the unmoved
@@ -28,13 +40,7 @@ pub fn cut_points(
     let mut points = Vec::new();
     for annotation in annotations.iter().filter(|a| a.cut == cut) {
         let view = &views[annotation.view];
-        let pelvis_from_camera = view.camera_from_pelvis.inverse();
-        let detector = pelvis_from_camera * view.camera.detector_point(&annotation.pixel);
-        let source = pelvis_from_camera * Point::origin();
-        let ray = Ray {
-            origin: detector,
-            direction: (source - detector).normalize(),
-        };
+        let ray = detector_ray(&view.camera, &view.camera_from_pelvis, &annotation.pixel);
         for hit in pelvis.intersections(&ray) {
             let wanted = match annotation.crossing {
                 Crossing::Entry => hit.entering,
