@@ -1,1 +1,36 @@
 //! Configuration, plan, runner and resume of a study.
+
+pub mod config;
+mod config_difference;
+mod config_errors;
+mod config_file;
+mod config_table;
+#[cfg(test)]
+mod engine_tests;
+pub mod folder;
+pub mod key;
+mod key_row;
+pub mod plan;
+pub mod provenance;
+mod queue;
+pub mod runner;
+pub mod scenario;
+pub mod session;
+pub mod state;
+pub mod strategies;
+pub mod worker;
+
+pub use config::{Config, SpecimenSource};
+pub use config_difference::Difference;
+pub use config_errors::{ConfigError, Mistake};
+pub use config_file::Environment;
+pub use folder::{StudyError, StudyFolder};
+pub use key::{CaseKey, FragmentKey, KeyError, RegistrationKey};
+pub use plan::Plan;
+pub use provenance::Provenance;
+pub use runner::{Ending, Event, RunOptions};
+pub use scenario::Scenario;
+pub use session::{OpenOptions, Outcome, Redo, Study};
+pub use state::State;
+pub use strategies::StrategyParameters;
+pub use worker::{Failure, Worker};

@@ -1,0 +1,60 @@
+//! With what and where an attempt runs.
+
+use super::Config;
+use crate::simd::SimdLevel;
+use serde::{Deserialize, Serialize};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// One attempt's circumstances. Rows of attempts that differ in `config` or `code` are not mixed
+/// unless somebody says so.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Provenance {
+    /// Version of the program.
+    pub version: String,
+    /// Hash of the program's sources and lock file.
+    pub code: String,
+    /// Commit of the sources, `-dirty` appended when they differ from it; `unknown` outside git.
+    pub commit: String,
+    /// BLAKE3 of the configuration's keys that results depend on.
+    pub config: String,
+    /// Level of vector instructions.
+    pub simd: SimdLevel,
+    pub host: String,
+    /// Operating system and architecture.
+    pub platform: String,
+    /// Model of the processor, where the system tells it.
+    pub cpu: String,
+    pub threads: usize,
+    /// Seconds since 1970 (UTC).
+    pub started_unix: u64,
+}
+
+impl Provenance {
+    /// The circumstances of a run that begins now.
+    pub fn now(config: &Config, threads: usize) -> Self {
+        let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
+        Self {
+            version: env!("CARGO_PKG_VERSION").into(),
+            code: env!("PAO_SIM_CODE_HASH").into(),
+            commit: env!("PAO_SIM_COMMIT").into(),
+            config: config.hash(),
+            simd: SimdLevel::current(),
+            host: first_line("/proc/sys/kernel/hostname").unwrap_or_else(|| "unknown".into()),
+            platform: format!("{}-{}", std::env::consts::OS, std::env::consts::ARCH),
+            cpu: cpu_model().unwrap_or_else(|| "unknown".into()),
+            threads,
+            started_unix: since_1970.map_or(0, |elapsed| elapsed.as_secs()),
+        }
+    }
+}
+
+fn first_line(path: &str) -> Option<String> {
+    let text = std::fs::read_to_string(path).ok()?;
+    Some(text.lines().next()?.trim().to_owned())
+}
+
+fn cpu_model() -> Option<String> {
+    let text = std::fs::read_to_string("/proc/cpuinfo").ok()?;
+    let line = text.lines().find(|line| line.starts_with("model name"))?;
+    Some(line.split_once(':')?.1.trim().to_owned())
+}
