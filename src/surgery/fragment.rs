@@ -69,6 +69,11 @@ pub enum FragmentError {
         voxels: usize,
         chisel_width_mm: f64,
     },
+    #[error(
+        "the {} cut of {hip} does not touch the fragment, so it has no middle to turn about; move it onto the bone",
+        .cut.name()
+    )]
+    CutMissesBone { hip: String, cut: Cut },
 }
 
 /// The voxels that a surgery changes: enough to rebuild its label map, at a hundredth of the size.
@@ -107,6 +112,12 @@ impl SurgeryMap {
 }
 
 impl Carving {
+    /// The fragment (without the cuts) as a mask on the box [`Carving::bounds`] of the specimen's
+    /// grid.
+    pub fn fragment_mask(&self, grid: &Grid) -> Volume<bool> {
+        mask_of(grid, self.bounds, &self.fragment)
+    }
+
     /// The label map: a copy of the specimen's with the carved voxels set.
     pub fn into_map(self, hip: &Hip, cuts: &CutPlanes) -> SurgeryMap {
         let mut labels = hip.specimen.labels.clone();
@@ -196,25 +207,24 @@ pub fn carve(
     })
 }
 
-/// The mid-sagittal plane (through the middle of both ASIS) and the lateral one, in the APP,
-/// normals out of the hull.
-fn helper_planes(hip: &Hip, parameters: &FragmentParameters) -> Result<[Plane; 2], FrameError> {
-    let own = hip.app_from_volume * hip.landmark(Landmark::Asis)?;
+/// The APP's x of the mid-sagittal plane, which passes through the middle of both ASIS.
+pub(super) fn midline(hip: &Hip) -> Result<f64, FrameError> {
     let other_side = hip.side.opposite();
-    let other = hip
-        .specimen
-        .landmarks
-        .get(Landmark::Asis, other_side)
-        .ok_or_else(|| FrameError::Missing(Landmark::Asis.key(other_side)))?;
-    let middle = nalgebra::center(&own, &(hip.app_from_volume * other));
+    let own = hip.landmark(Landmark::Asis)?;
+    let other = hip.specimen.landmarks.get(Landmark::Asis, other_side);
+    let other = other.ok_or_else(|| FrameError::Missing(Landmark::Asis.key(other_side)))?;
+    Ok((hip.app_from_volume * nalgebra::center(&own, &other)).x)
+}
+
+/// The mid-sagittal plane and the lateral one, in the APP, normals out of the hull.
+pub(super) fn helper_planes(
+    hip: &Hip,
+    parameters: &FragmentParameters,
+) -> Result<[Plane; 2], FrameError> {
     let lateral = hip.lateral();
-    Ok([
-        Plane::through(&middle, &-lateral),
-        Plane::through(
-            &Point::from(lateral * parameters.lateral_limit_mm),
-            &lateral,
-        ),
-    ])
+    let medial = Plane::through(&Point::new(midline(hip)?, 0.0, 0.0), &-lateral);
+    let outermost = Point::from(lateral * parameters.lateral_limit_mm);
+    Ok([medial, Plane::through(&outermost, &lateral)])
 }
 
 /// Room for rounding in mm: a centre on a plane lies inside it, and one that is exactly the
@@ -293,25 +303,31 @@ fn candidates(labels: &Volume<u8>, hull: &[IndexPlane]) -> Vec<usize> {
 
 /// The voxels of the largest 6-connected component, ascending.
 fn largest_of(grid: &Grid, candidates: &[usize]) -> Vec<usize> {
-    let (min, max) = bounds_of(grid, candidates);
-    let mut mask = Volume::filled(grid.cropped(min, max), false);
-    let inner = |offset: usize| {
-        let [i, j, k] = grid.voxel(offset);
-        let dims = mask.grid.dims;
-        ((k - min[2]) * dims[1] + (j - min[1])) * dims[0] + (i - min[0])
-    };
-    let places: Vec<usize> = candidates.iter().map(|&offset| inner(offset)).collect();
-    for &place in &places {
-        mask.data[place] = true;
-    }
-    let all = components(&mask);
+    let bounds = bounds_of(grid, candidates);
+    let all = components(&mask_of(grid, bounds, candidates));
     let largest = all.largest();
+    let number = |offset| Some(all.labels.data[place_in(grid, bounds, offset)]);
     candidates
         .iter()
-        .zip(&places)
-        .filter(|&(_, &place)| Some(all.labels.data[place]) == largest)
-        .map(|(&offset, _)| offset)
+        .copied()
+        .filter(|&offset| number(offset) == largest)
         .collect()
+}
+
+/// A mask on a box (min, max, both included) of `grid` that is true at `offsets`.
+fn mask_of(grid: &Grid, bounds: ([usize; 3], [usize; 3]), offsets: &[usize]) -> Volume<bool> {
+    let mut mask = Volume::filled(grid.cropped(bounds.0, bounds.1), false);
+    for &offset in offsets {
+        mask.data[place_in(grid, bounds, offset)] = true;
+    }
+    mask
+}
+
+/// Where a voxel of `grid` lies in the memory of a box of it.
+fn place_in(grid: &Grid, (min, max): ([usize; 3], [usize; 3]), offset: usize) -> usize {
+    let [i, j, k] = grid.voxel(offset);
+    let (ni, nj) = (max[0] - min[0] + 1, max[1] - min[1] + 1);
+    ((k - min[2]) * nj + (j - min[1])) * ni + (i - min[0])
 }
 
 /// The smallest box that holds all of `offsets`, which must not be empty.

@@ -7,8 +7,11 @@ pub mod fragment;
 pub mod insertion_zone;
 pub mod kwire;
 pub mod nominal_cuts;
+pub mod plausibility;
 mod posterior_column;
+pub mod random_cuts;
 mod ranges;
+pub mod sampling;
 #[cfg(test)]
 pub(crate) mod toy_hip;
 
@@ -19,3 +22,6 @@ pub use fragment::{FragmentError, FragmentParameters, SurgeryMap, cut_fragment};
 pub use insertion_zone::ZoneParameters;
 pub use kwire::{KWire, KWireError, KWireModel, KWireParameters, place_kwires};
 pub use nominal_cuts::{NominalCutError, NominalCutParameters, nominal_cuts};
+pub use plausibility::{PlausibilityParameters, Rejection, plausible_fragment};
+pub use random_cuts::{CutPivots, RandomCutParameters, random_cuts};
+pub use sampling::{FragmentSamplingParameters, RejectionCounts, SampleError, sample_fragment};

@@ -86,7 +86,8 @@ pub enum NominalCutError {
 /// - *posterior*: parallel to the posterior border of the column between sciatic notch and
 ///   ischium (the median slope of that border), midway between it and the acetabulum;
 /// - *ilium*: from the anterior border midway between AIIS and ASIS to the posterior cut, at the
-///   height midway between the notch and the rim point nearest to it;
+///   height midway between the notch and the rim point nearest to it, or higher where it would
+///   not clear the acetabulum;
 /// - *ischium*: from the posterior cut at the level of the lowest rim point forward, as steep as
 ///   it takes to pass the clearance below the acetabulum: through the infracotyloid groove;
 /// - *pubis*: sagittal, the clearance medial of the acetabulum.
@@ -134,12 +135,14 @@ pub fn nominal_cuts(
         foot + up * ((y - foot.y) / up.y)
     };
 
-    let ilium_back = at_height(0.5 * (notch.y + nearest(&rim, &notch).y));
     let ilium_front = aiis + (asis - aiis) * parameters.ilium_fraction;
-    let ilium = Plane::through(
-        &ilium_back.into(),
-        &(ilium_front - ilium_back).cross(&Vector::x()),
-    );
+    let planned = at_height(0.5 * (notch.y + nearest(&rim, &notch).y)) - ilium_front;
+    let rise = joint
+        .iter()
+        .map(|p| lowest_rise(&(p - ilium_front), clearance))
+        .fold(planned.y.atan2(-planned.z), f64::max);
+    let ilium_backward = Vector::new(0.0, rise.sin(), -rise.cos());
+    let ilium = Plane::through(&ilium_front.into(), &Vector::x().cross(&ilium_backward));
 
     let ischium_back = at_height(lowest_rim);
     let slope = joint
@@ -214,4 +217,10 @@ fn median_slope(border: &[Vector]) -> f64 {
 /// `clearance` below `p`.
 fn steepest_slope(p: &Vector, clearance: f64) -> f64 {
     p.y.atan2(p.z) - (clearance / p.norm()).clamp(-1.0, 1.0).asin()
+}
+
+/// The angle (rad, upward from posterior) of the lowest line through the origin that passes
+/// `clearance` above `p`.
+fn lowest_rise(p: &Vector, clearance: f64) -> f64 {
+    p.y.atan2(-p.z) + (clearance / p.norm()).clamp(-1.0, 1.0).asin()
 }

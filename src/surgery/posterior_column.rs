@@ -1,10 +1,14 @@
-//! The posterior column's border: the bone's back edge between sciatic notch and ischium.
+//! The posterior column: its border between sciatic notch and ischium, and whether a surgery leaves
+//! it whole.
 
 use super::acetabulum::Acetabulum;
-use crate::anatomy::{Hip, Label};
+use super::fragment::{Carving, midline};
+use super::{Cut, CutPlanes};
+use crate::anatomy::frame::FrameError;
+use crate::anatomy::{Hip, Label, Landmark};
 use crate::geometry::{Point, Vector};
 use crate::volume::components::components;
-use crate::volume::{Grid, Volume};
+use crate::volume::{Grid, Volume, morphology};
 use std::ops::RangeInclusive;
 
 /// Part of each axial slice that is looked at, in mm from the femoral head: medial, lateral,
@@ -108,4 +112,93 @@ fn hindmost(hip: &Hip, y: f64, wall: &Point) -> Option<f64> {
     let (_, column) = nearest?;
     let bounds = pieces.labels.bounds(|piece| piece == column);
     bounds.map(|(min, _)| grid.center(min).y)
+}
+
+/// How far above the notch and below the lowest rim point (mm) bone has to be connected.
+const BEYOND_MM: f64 = 10.0;
+
+/// True if bone at least `column_mm` thick still connects the ischium (below the rim) with the ilium
+/// (above the notch) behind the posterior cut.
+///
+/// Counted is bone of this side, behind the head's frontal plane, that lies outside of the ilium,
+/// ischium or posterior cut: neither the way round by the pubic rami nor a strip that the pubis cut
+/// leaves medial of the acetabulum makes a posterior column.
+pub(super) fn column_holds(
+    hip: &Hip,
+    acetabulum: &Acetabulum,
+    cuts: &CutPlanes,
+    carving: &Carving,
+    column_mm: f64,
+) -> Result<bool, FrameError> {
+    let notch = hip.app_from_volume * hip.landmark(Landmark::Gsn)?;
+    let lowest_rim = acetabulum
+        .rim
+        .iter()
+        .map(|p| p.y)
+        .fold(f64::INFINITY, f64::min);
+    let (ischium_y, ilium_y) = (lowest_rim - BEYOND_MM, notch.y + BEYOND_MM);
+    let midline = midline(hip)?;
+    let [_, lateral, backward, _] = SLICE_MM;
+    let sign = hip.side.lateral_sign();
+    let corners = [
+        Point::new(midline, ischium_y - BEYOND_MM, -backward),
+        Point::new(lateral * sign, ilium_y + BEYOND_MM, 0.0),
+    ];
+    let labels = &hip.specimen.labels;
+    let Some((min, max)) = box_in_grid(hip, &labels.grid, &corners) else {
+        return Ok(false);
+    };
+    let mut bone = labels.cropped(min, max).map(|l| l == Label::Pelvis.value());
+    let grid = bone.grid.clone();
+    for &offset in carving.fragment.iter().chain(&carving.cut) {
+        let voxel = labels.grid.voxel(offset);
+        if (0..3).all(|a| (min[a]..=max[a]).contains(&voxel[a])) {
+            let [i, j, k] = std::array::from_fn(|a| voxel[a] - min[a]);
+            bone.data[grid.offset(i, j, k)] = false;
+        }
+    }
+    let position = |offset: usize| hip.app_from_volume * grid.center(grid.voxel(offset));
+    let around = [Cut::Ilium, Cut::Ischium, Cut::Posterior].map(|cut| *cuts.get(cut));
+    for offset in 0..bone.data.len() {
+        if bone.data[offset] {
+            let p = position(offset);
+            bone.data[offset] = p.z < 0.0
+                && (p.x - midline) * sign > 0.0
+                && around.iter().any(|plane| plane.signed_distance(&p) > 0.0);
+        }
+    }
+    let pieces = components(&morphology::erode(&bone, 0.5 * column_mm));
+    let mut reaches = vec![(false, false); pieces.sizes.len()];
+    for (offset, &piece) in pieces.labels.data.iter().enumerate() {
+        if piece != 0 {
+            let y = position(offset).y;
+            let (down, up) = &mut reaches[piece as usize - 1];
+            *down |= y < ischium_y;
+            *up |= y > ilium_y;
+        }
+    }
+    Ok(reaches.contains(&(true, true)))
+}
+
+/// The voxels (min, max, both included) of a grid that a box of the APP, given by two opposite
+/// corners, touches; `None` if it touches none.
+fn box_in_grid(hip: &Hip, grid: &Grid, corners: &[Point; 2]) -> Option<([usize; 3], [usize; 3])> {
+    let volume_from_app = hip.app_from_volume.inverse();
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for n in 0..8 {
+        let corner = Point::from(Vector::from_fn(|a, _| corners[n >> a & 1][a]));
+        let index = grid.index(&(volume_from_app * corner));
+        for a in 0..3 {
+            low[a] = low[a].min(index[a]);
+            high[a] = high[a].max(index[a]);
+        }
+    }
+    let last = |a: usize| grid.dims[a] as f64 - 1.0;
+    let touches = (0..3).all(|a| high[a] >= 0.0 && low[a] <= last(a));
+    touches.then(|| {
+        (
+            std::array::from_fn(|a| low[a].clamp(0.0, last(a)).floor() as usize),
+            std::array::from_fn(|a| high[a].clamp(0.0, last(a)).ceil() as usize),
+        )
+    })
 }
