@@ -1,5 +1,6 @@
 //! Specimens: CT, labels, landmarks, rims; their anatomical frames; where they come from.
 
+pub mod detect;
 pub mod disk;
 pub mod frame;
 pub mod label;
@@ -10,6 +11,7 @@ pub mod phantom;
 pub mod problem;
 pub mod side;
 pub mod specimen;
+pub mod surfaces;
 
 pub use disk::{SpecimenError, read_specimen, write_specimen};
 pub use frame::Hip;

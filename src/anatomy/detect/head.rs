@@ -1,0 +1,143 @@
+//! The femoral head as a sphere.
+
+use super::{DetectError, local::Local};
+use crate::anatomy::Side;
+use crate::geometry::{Point, Vector};
+use crate::volume::Surface;
+use nalgebra::{Matrix4, Vector4};
+
+/// Vertices at most this far below the femur's top are searched for the head: more than the
+/// diameter of any head, less than the distance to the shaft (mm).
+const PROXIMAL_MM: f64 = 80.0;
+
+/// Where the fit starts: an average radius (mm).
+const START_RADIUS_MM: f64 = 23.0;
+
+/// Vertices within this distance of the sphere belong to the head (mm); the fovea and bony spurs
+/// do not.
+const BAND_MM: f64 = 1.0;
+
+/// A worse fit is refused (mm RMS).
+const MAX_RMS_MM: f64 = 1.0;
+
+/// A femoral head.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Head {
+    /// In the world of the surfaces (LPS, mm).
+    pub center: Point,
+    pub radius_mm: f64,
+    /// Root mean square distance of the head's vertices from the sphere.
+    pub rms_mm: f64,
+    /// Number of those vertices.
+    pub vertices: usize,
+}
+
+/// Fits a sphere to the part of the head that faces away from the neck: least squares over the
+/// vertices in a band about the sphere, which narrows from 5 to 1 mm while the fit settles.
+///
+/// `local` gives the directions; its origin plays no part.
+pub(super) fn femoral_head(
+    femur: &Surface,
+    side: Side,
+    local: &Local,
+) -> Result<Head, DetectError> {
+    let points: Vec<Vector> = femur
+        .vertices()
+        .iter()
+        .map(|p| local.coordinates(p))
+        .collect();
+    let top = points.iter().map(|p| p.y).fold(f64::MIN, f64::max);
+    let proximal: Vec<Vector> = points
+        .into_iter()
+        .filter(|p| p.y > top - PROXIMAL_MM)
+        .collect();
+    let not_found = |reason: &str| DetectError::NotFound {
+        what: "femoral head",
+        side,
+        reason: reason.into(),
+    };
+    let most_medial = proximal
+        .iter()
+        .copied()
+        .min_by(|a, b| a.x.total_cmp(&b.x))
+        .ok_or_else(|| not_found("the femur has no vertices"))?;
+    let away_from_neck = Vector::new(-1.0, 1.0, 0.0).normalize();
+    let mut center = most_medial + Vector::x() * START_RADIUS_MM;
+    let mut radius = START_RADIUS_MM;
+    for round in 0..200 {
+        let band = BAND_MM + 4.0 * 0.9_f64.powi(round);
+        let near: Vec<Vector> = proximal
+            .iter()
+            .copied()
+            .filter(|p| {
+                let arm = p - center;
+                (arm.norm() - radius).abs() < band && arm.dot(&away_from_neck) > -0.2 * arm.norm()
+            })
+            .collect();
+        let (next, next_radius) =
+            sphere(&near).ok_or_else(|| not_found("too few vertices lie on one sphere"))?;
+        let step = (next - center).norm();
+        (center, radius) = (next, next_radius);
+        if round > 60 && step < 1e-9 {
+            let square: f64 = near
+                .iter()
+                .map(|p| ((p - center).norm() - radius).powi(2))
+                .sum();
+            let rms_mm = (square / near.len() as f64).sqrt();
+            if rms_mm > MAX_RMS_MM {
+                break;
+            }
+            return Ok(Head {
+                center: local.point(&center),
+                radius_mm: radius,
+                rms_mm,
+                vertices: near.len(),
+            });
+        }
+    }
+    Err(not_found(
+        "the sphere's fit does not settle; is the head whole and round?",
+    ))
+}
+
+/// The algebraic least-squares sphere: |p|^2 = 2 c.p + (r^2 - |c|^2).
+pub(super) fn sphere(points: &[Vector]) -> Option<(Vector, f64)> {
+    if points.len() < 30 {
+        return None;
+    }
+    // About the mean, so that the normal equations are well conditioned.
+    let mean: Vector = points.iter().sum::<Vector>() / points.len() as f64;
+    let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
+    for p in points {
+        let q = p - mean;
+        let row = Vector4::new(2.0 * q.x, 2.0 * q.y, 2.0 * q.z, 1.0);
+        normal += row * row.transpose();
+        right += row * q.norm_squared();
+    }
+    let solution = normal.cholesky()?.solve(&right);
+    let offset = solution.xyz();
+    let square = solution.w + offset.norm_squared();
+    (square > 0.0).then(|| (mean + offset, square.sqrt()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sphere_of_a_cap_is_found() {
+        let center = Vector::new(-320.0, 45.0, -880.0);
+        let mut cap = Vec::new();
+        for i in 0..40 {
+            for j in 0..12 {
+                let (a, b) = (i as f64 * 0.157, j as f64 * 0.1);
+                cap.push(
+                    center + Vector::new(b.cos(), b.sin() * a.cos(), b.sin() * a.sin()) * 23.5,
+                );
+            }
+        }
+        let (found, radius) = sphere(&cap).unwrap();
+        assert!((found - center).norm() < 1e-8 && (radius - 23.5).abs() < 1e-8);
+        assert!(sphere(&cap[..20]).is_none());
+    }
+}

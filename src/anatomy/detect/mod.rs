@@ -1,0 +1,24 @@
+//! Landmarks and rims found by geometric rules on bone surfaces.
+//!
+//! The rules use directions of the pelvis and sizes of the bones themselves, so they hold for any
+//! position of the patient in the scanner. The order: pelvic frame, femoral heads, bony
+//! prominences, symphysis, foramen and notch, rim.
+
+mod bones;
+mod closed_curve;
+mod error;
+mod foramen;
+mod head;
+mod landmarks;
+mod local;
+mod notch;
+mod outline;
+mod pelvic_frame;
+mod prominence;
+mod rim;
+mod symphysis;
+
+pub use bones::BoneSurfaces;
+pub use error::DetectError;
+pub use head::Head;
+pub use landmarks::{Detected, detect};

@@ -1,0 +1,60 @@
+//! The greater sciatic notch.
+
+use super::{DetectError, local::Local, outline::Outline};
+use crate::anatomy::Side;
+use crate::geometry::{Point, Vector};
+use crate::volume::Surface;
+use nalgebra::Vector2;
+
+/// The deepest point of the greater sciatic notch, seen from the side: the edge point farthest
+/// from the chord between the ischial spine and the posterior inferior end of the ilium.
+///
+/// `local` has its origin at the femoral head's centre.
+pub(super) fn greater_sciatic_notch(
+    hip: &Surface,
+    side: Side,
+    local: &Local,
+    radius_mm: f64,
+    ischial_spine: &Point,
+) -> Result<Point, DetectError> {
+    let not_found = |reason: &str| DetectError::NotFound {
+        what: "greater sciatic notch",
+        side,
+        reason: reason.into(),
+    };
+    let back_and_down = Vector::new(0.0, -1.0, -1.0);
+    let reach = |p: &Point| local.coordinates(p).dot(&back_and_down);
+    let ilium = hip
+        .vertices()
+        .iter()
+        .filter(|p| local.coordinates(p).y > radius_mm)
+        .max_by(|a, b| reach(a).total_cmp(&reach(b)))
+        .ok_or_else(|| not_found("the hip bone ends at the femoral head's level"))?;
+    let [_, superior, anterior] = local.axes;
+    let outline = Outline::new(hip, local.origin, anterior, superior);
+    let flat = |p: &Point| {
+        let c = local.coordinates(p);
+        Vector2::new(c.z, c.y)
+    };
+    let (low, high) = (flat(ischial_spine), flat(ilium));
+    let along = high - low;
+    let forward = Vector2::new(along.y, -along.x).normalize();
+    let mut deepest: Option<(f64, Vector2<f64>)> = None;
+    for percent in 5..=95 {
+        let start = low + along * (f64::from(percent) / 100.0);
+        if outline.covered(&start) {
+            continue;
+        }
+        let depth = outline
+            .distance(&start, &forward, 150.0)
+            .ok_or_else(|| not_found("nothing closes it in front"))?;
+        if deepest.is_none_or(|(most, _)| depth > most) {
+            deepest = Some((depth, start));
+        }
+    }
+    let (depth, start) =
+        deepest.ok_or_else(|| not_found("bone fills it between ischial spine and ilium"))?;
+    outline
+        .surface_point(&(start + forward * (depth + 0.4)))
+        .ok_or_else(|| not_found("its edge could not be met"))
+}

@@ -1,0 +1,110 @@
+//! The frame of a pelvis that lies face down on a table: patients lie rotated in the scanner, and
+//! every later rule speaks of "anterior" and "superior".
+
+use super::{BoneSurfaces, DetectError, local::Local};
+use crate::anatomy::Side;
+use crate::geometry::{Point, Vector};
+use crate::volume::Surface;
+
+/// The iteration settles in two or three rounds; each visits a finite set of vertices.
+const MAX_ROUNDS: usize = 30;
+
+/// Directions of the pelvis, and the points that define them.
+#[derive(Clone, Debug)]
+pub(super) struct PelvicFrame {
+    /// World directions: to the patient's left, superior, anterior.
+    axes: [Vector; 3],
+    /// The most anterior point of each ilium, by [`Side::index`].
+    pub ilium: [Point; 2],
+    /// The most anterior point of each pubic bone, by [`Side::index`].
+    pub pubis: [Point; 2],
+}
+
+impl PelvicFrame {
+    /// Distance of the two iliac points in mm: the size that regions scale with.
+    pub fn width(&self) -> f64 {
+        (self.ilium[0] - self.ilium[1]).norm()
+    }
+
+    /// The frame of one side.
+    pub fn local(&self, side: Side, origin: Point) -> Local {
+        let [left, superior, anterior] = self.axes;
+        Local {
+            origin,
+            axes: [left * side.lateral_sign(), superior, anterior],
+        }
+    }
+}
+
+/// The plane on which the pelvis rests face down: through the most anterior points of both ilia
+/// and the midpoint of those of the pubic bones. "Anterior" is that plane's normal, so the points
+/// are searched again in the frame they define until they stay.
+pub(super) fn pelvic_frame(bones: &BoneSurfaces) -> Result<PelvicFrame, DetectError> {
+    let [left, right] = Side::BOTH.map(|side| mean(bones.hip(side)));
+    let feet = nalgebra::center(
+        &mean(bones.femur(Side::Left)),
+        &mean(bones.femur(Side::Right)),
+    );
+    let apart_mm = (left - right).norm();
+    if left.x < right.x {
+        return Err(DetectError::SidesSwapped {
+            apart_mm: right.x - left.x,
+        });
+    }
+    let no_axis = || DetectError::NoAxis { apart_mm };
+    let mut axes = axes(&left, &right, &feet).ok_or_else(no_axis)?;
+    for _ in 0..MAX_ROUNDS {
+        let [_, superior, anterior] = axes;
+        let ends = Side::BOTH.map(|side| foremost(bones.hip(side), &superior, &anterior));
+        let frame = PelvicFrame {
+            axes,
+            ilium: ends.map(|e| e.0),
+            pubis: ends.map(|e| e.1),
+        };
+        let [l, r] = frame.ilium;
+        let pubis = nalgebra::center(&frame.pubis[0], &frame.pubis[1]);
+        let next = self::axes(&l, &r, &pubis).ok_or_else(no_axis)?;
+        if next == axes {
+            return Ok(frame);
+        }
+        axes = next;
+    }
+    Err(DetectError::FrameUnsettled(MAX_ROUNDS))
+}
+
+/// Left, superior and anterior, from two points left and right and one below them.
+fn axes(left: &Point, right: &Point, below: &Point) -> Option<[Vector; 3]> {
+    let x = (left - right).try_normalize(1.0)?;
+    let up = nalgebra::center(left, right) - below;
+    let y = (up - x * up.dot(&x)).try_normalize(1.0)?;
+    Some([x, y, x.cross(&y)])
+}
+
+fn mean(surface: &Surface) -> Point {
+    let sum: Vector = surface.vertices().iter().map(|p| p.coords).sum();
+    Point::from(sum / surface.vertices().len() as f64)
+}
+
+/// The most anterior vertices of the upper and of the lower half of a hip bone.
+fn foremost(hip: &Surface, superior: &Vector, anterior: &Vector) -> (Point, Point) {
+    let height = |p: &Point| p.coords.dot(superior);
+    let (mut low, mut high) = (f64::MAX, f64::MIN);
+    for p in hip.vertices() {
+        low = low.min(height(p));
+        high = high.max(height(p));
+    }
+    let middle = (low + high) / 2.0;
+    let best = |upper: bool| {
+        let half = hip
+            .vertices()
+            .iter()
+            .filter(|p| (height(p) > middle) == upper);
+        half.copied()
+            .max_by(|a, b| {
+                let front = |p: &Point| p.coords.dot(anterior);
+                front(a).total_cmp(&front(b))
+            })
+            .unwrap_or(hip.vertices()[0])
+    };
+    (best(true), best(false))
+}
