@@ -1,8 +1,10 @@
 //! The cost of each patch of one gradient direction.
 
+use super::lanes::{Lanes, LanesWork};
+#[cfg(doc)]
+use super::patch_sums::PADDING;
 use super::patch_sums::PatchSums;
 use crate::image::PixelRect;
-use crate::simd::for_simd_level;
 
 /// Smallest standard deviation of a patch's gradients (facts 2.2, item 3); the unit is that of
 /// line integrals.
@@ -19,74 +21,77 @@ pub(super) struct FixedGradient {
     scales: Vec<f32>,
 }
 
-for_simd_level! {
-    /// The fixed image's part of every patch.
-    pub(super) fn fixed_gradient(sums: &mut PatchSums, values: Vec<f32>) -> FixedGradient
-        = fixed_gradient_loops;
+/// Prepares the fixed image's part of every patch of a gradient image, which comes with
+/// [`PADDING`] values after its last pixel.
+pub(super) struct PrepareFixed<'a> {
+    pub sums: &'a mut PatchSums,
+    pub values: Vec<f32>,
 }
 
-#[inline(always)]
-fn fixed_gradient_loops(sums: &mut PatchSums, values: Vec<f32>) -> FixedGradient {
-    let centers = sums.all_centers();
-    let n = sums.patch_pixels();
-    let count = centers.width() * centers.height();
-    let (mut means, mut scales) = (Vec::with_capacity(count), Vec::with_capacity(count));
-    sums.for_each_row(&values, &values, centers, |_, [sum, squares, _]| {
-        for (&sum, &squares) in sum.iter().zip(squares) {
-            let mean = sum / n;
-            let variance = (squares - sum * mean) / (n - 1.0);
-            let sd = variance.max(0.0).sqrt().max(SD_FLOOR);
-            means.push(mean);
-            scales.push((1.0 / (n * sd)) as f32);
+impl LanesWork for PrepareFixed<'_> {
+    type Output = FixedGradient;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> FixedGradient {
+        let Self { sums, values } = self;
+        let centers = sums.all_centers();
+        let n = sums.patch_pixels();
+        let count = centers.width() * centers.height();
+        let (mut means, mut scales) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        for y in centers.y0..centers.y1 {
+            let [sum, squares, _] = sums.sum_row::<L>(&values, &values, centers, y);
+            for (&sum, &squares) in sum.iter().zip(squares) {
+                let mean = sum / n;
+                let variance = (squares - sum * mean) / (n - 1.0);
+                let sd = variance.max(0.0).sqrt().max(SD_FLOOR);
+                means.push(mean);
+                scales.push((1.0 / (n * sd)) as f32);
+            }
         }
-    });
-    FixedGradient {
-        values,
-        means,
-        scales,
+        FixedGradient {
+            values,
+            means,
+            scales,
+        }
     }
 }
 
 /// Adding and subtracting this rounds a number of small size to a multiple of 2^-30.
 const ROUNDER: f64 = 1.5 * (1u64 << 22) as f64;
 
-for_simd_level! {
-    /// The sum of the costs of the patches around `centers`, each rounded to a multiple of 2^-30:
-    /// sums of fewer than 2^22 of them are exact, in any order. `map`, if given, holds one value
-    /// for each patch of the image, to which its cost is added; `row` is scratch of one row.
-    pub(super) fn sum_of_costs(
-        sums: &mut PatchSums,
-        row: &mut [f64],
-        moving: &[f32],
-        fixed: &FixedGradient,
-        centers: PixelRect,
-        map: Option<&mut [f64]>,
-    ) -> f64 = sum_of_costs_loops;
+/// Sums the costs of the patches around `centers`, each rounded to a multiple of 2^-30: sums of
+/// fewer than 2^22 of them are exact, in any order.
+pub(super) struct SumOfCosts<'a> {
+    pub sums: &'a mut PatchSums,
+    /// Scratch of one row.
+    pub row: &'a mut [f64],
+    /// The moving gradient, with [`PADDING`] values after its last pixel.
+    pub moving: &'a [f32],
+    pub fixed: &'a FixedGradient,
+    pub centers: PixelRect,
+    /// If given, each patch's cost is added to its value here, one for each patch of the image.
+    pub map: Option<&'a mut [f64]>,
 }
 
-#[inline(always)]
-fn sum_of_costs_loops(
-    sums: &mut PatchSums,
-    row: &mut [f64],
-    moving: &[f32],
-    fixed: &FixedGradient,
-    centers: PixelRect,
-    mut map: Option<&mut [f64]>,
-) -> f64 {
-    let all = sums.all_centers();
-    let n = sums.patch_pixels();
-    let (per_pixel, per_freedom) = (1.0 / n, 1.0 / (n - 1.0));
-    let count = centers.width();
-    let row = &mut row[..count];
-    let mut total = 0.0;
-    sums.for_each_row(
-        moving,
-        &fixed.values,
-        centers,
-        |y, [sum, squares, products]| {
+impl LanesWork for SumOfCosts<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<L: Lanes>(mut self) -> f64 {
+        let (centers, all) = (self.centers, self.sums.all_centers());
+        let n = self.sums.patch_pixels();
+        let (per_pixel, per_freedom) = (1.0 / n, 1.0 / (n - 1.0));
+        let count = centers.width();
+        let row = &mut self.row[..count];
+        let mut total = 0.0;
+        for y in centers.y0..centers.y1 {
+            let [sum, squares, products] =
+                self.sums
+                    .sum_row::<L>(self.moving, &self.fixed.values, centers, y);
             let first = (y - all.y0) * all.width() + centers.x0 - all.x0;
-            let means = &fixed.means[first..first + count];
-            let scales = &fixed.scales[first..first + count];
+            let means = &self.fixed.means[first..first + count];
+            let scales = &self.fixed.scales[first..first + count];
+            let (sum, squares, products) = (&sum[..count], &squares[..count], &products[..count]);
             for (i, cost) in row.iter_mut().enumerate() {
                 let covariance = products[i] - sum[i] * means[i];
                 let variance = (squares[i] - sum[i] * sum[i] * per_pixel) * per_freedom;
@@ -95,14 +100,14 @@ fn sum_of_costs_loops(
                 *cost = (1.0 - f64::from(ncc)) + ROUNDER - ROUNDER;
             }
             total += sum_by_lanes(row);
-            if let Some(map) = map.as_deref_mut() {
+            if let Some(map) = &mut self.map {
                 for (m, &cost) in map[first..first + count].iter_mut().zip(row.iter()) {
                     *m += cost;
                 }
             }
-        },
-    );
-    total
+        }
+        total
+    }
 }
 
 /// The sum in an order that vector instructions can follow.

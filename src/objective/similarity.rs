@@ -1,11 +1,12 @@
 //! Patch gradient NCC between a fixed image and projections.
 
 use super::comparison::Comparison;
-use super::patch_cost::{FixedGradient, fixed_gradient};
-use super::patch_sums::PatchSums;
+use super::lanes::with_lanes;
+use super::patch_cost::{FixedGradient, PrepareFixed};
+use super::patch_sums::{PADDING, PatchSums};
+use crate::image::Image;
 use crate::image::filter::GaussianKernel;
 use crate::image::gradient::{MAX_RADIUS, SmoothGradient};
-use crate::image::{Image, PixelRect};
 use crate::simd::SimdLevel;
 use crate::xray::Camera;
 use serde::{Deserialize, Serialize};
@@ -191,8 +192,12 @@ impl FixedView {
             GaussianKernel::with_width(parameters.gaussian_width_px, parameters.gaussian_sigma_px);
         let level = SimdLevel::current();
         let mut sums = PatchSums::new(width, height, radius);
-        let gradients = SmoothGradient::of_image(level, &image, kernel.clone())
-            .map(|gradient| fixed_gradient(level, &mut sums, gradient.data));
+        let gradients = SmoothGradient::of_image(level, &image, kernel.clone()).map(|gradient| {
+            let mut values = gradient.data;
+            values.extend([0.0; PADDING]);
+            let sums = &mut sums;
+            with_lanes(level, PrepareFixed { sums, values })
+        });
         Ok(Self {
             camera,
             image,
@@ -218,16 +223,12 @@ impl FixedView {
     }
 
     /// The similarity of one whole projection (of the camera's size), lower is better. Allocates;
-    /// a scorer does not.
+    /// a [`Comparison`] does not.
     ///
     /// # Panics
     /// When the projection is not of the camera's size.
     pub fn similarity(&self, projection: &Image<f32>) -> f64 {
-        let mut comparison = Comparison::new(self, SimdLevel::current());
-        let whole = PixelRect::of_image(self.camera.width, self.camera.height);
-        comparison.derive(&projection.data, whole);
-        let centers = comparison.all_centers();
-        comparison.sum_of_costs(self, centers, None) / self.costs()
+        Comparison::new(self, SimdLevel::current()).similarity(self, &projection.data)
     }
 
     /// Number of patch costs that the similarity averages: both directions of all patches.
