@@ -91,13 +91,25 @@ pub struct CutLines<'a> {
     hip: &'a Hip,
     pelvis: &'a Surface,
     map: &'a SurgeryMap,
+    /// Points of the ilium's and the pubis' line.
+    points: [Vec<Point>; 2],
 }
+
+/// The cuts that people annotate.
+const ANNOTATED: [Cut; 2] = [Cut::Ilium, Cut::Pubis];
 
 impl<'a> CutLines<'a> {
     /// `pelvis` is the surface of the whole preoperative pelvis in the specimen's world, `map` the
     /// true surgery's.
     pub fn new(hip: &'a Hip, pelvis: &'a Surface, map: &'a SurgeryMap) -> Self {
-        Self { hip, pelvis, map }
+        let mut lines = Self {
+            hip,
+            pelvis,
+            map,
+            points: Default::default(),
+        };
+        lines.points = ANNOTATED.map(|cut| lines.line(cut));
+        lines
     }
 
     /// A person's annotations of the ilium and pubis cuts in one view.
@@ -119,8 +131,9 @@ impl<'a> CutLines<'a> {
         stream: &mut Stream,
     ) -> Vec<CutAnnotation> {
         let mut annotations = Vec::new();
-        for cut in [Cut::Ilium, Cut::Pubis] {
-            let seen = self.seen(cut, camera, camera_from_volume, parameters.tolerance_mm);
+        for (cut, points) in ANNOTATED.into_iter().zip(&self.points) {
+            let tolerance_mm = parameters.tolerance_mm;
+            let seen = self.seen(cut, points, camera, camera_from_volume, tolerance_mm);
             if seen.len() < parameters.fewest_pixels {
                 continue;
             }
@@ -135,17 +148,19 @@ impl<'a> CutLines<'a> {
         annotations
     }
 
-    /// The labels of one cut without human error: pixel centres, row after row.
-    pub fn seen(
+    /// The labels of one cut, whose line has these `points`, without human error: pixel centres, row
+    /// after row.
+    fn seen(
         &self,
         cut: Cut,
+        points: &[Point],
         camera: &Camera,
         camera_from_volume: &Rigid,
         tolerance_mm: f64,
     ) -> Vec<(Pixel, Crossing)> {
         let plane = self.plane(cut);
         let mut pixels = BTreeSet::new();
-        for point in self.line(cut) {
+        for point in points {
             let pixel = camera.project(&(camera_from_volume * point));
             let (x, y) = (pixel.x.round(), pixel.y.round());
             let inside =
@@ -180,7 +195,7 @@ impl<'a> CutLines<'a> {
     }
 
     /// Points of the true line, at most [`SPACING_MM`] apart along it, in the world.
-    pub fn line(&self, cut: Cut) -> Vec<Point> {
+    fn line(&self, cut: Cut) -> Vec<Point> {
         let plane = self.plane(cut);
         let mut points = Vec::new();
         for triangle in 0..self.pelvis.triangles().len() {
@@ -390,7 +405,7 @@ mod tests {
             let lines = CutLines::new(scene.hip, scene.pelvis, &scene.map);
             for cut in [Cut::Ilium, Cut::Pubis] {
                 let plane = lines.plane(cut);
-                let seen = lines.seen(cut, &scene.camera, &scene.pose, 0.5);
+                let seen = lines.seen(cut, &lines.line(cut), &scene.camera, &scene.pose, 0.5);
                 let count = |wanted| seen.iter().filter(|(_, c)| *c == wanted).count();
                 assert!(seen.len() > 100, "{side} {}: {}", cut.name(), seen.len());
                 if cut == Cut::Ilium {

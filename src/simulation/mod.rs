@@ -1,6 +1,7 @@
 //! One case: perturb, move, wires, warp, views, fluoroscopy, picks, annotations. Holds the truth.
 
 pub mod annotate;
+pub mod case;
 pub mod fluoroscopy;
 pub mod movement;
 pub mod noise;
@@ -10,11 +11,14 @@ pub mod warp;
 pub mod wires;
 
 #[cfg(test)]
+mod case_tests;
+#[cfg(test)]
 mod shape_tests;
 #[cfg(test)]
 mod testing;
 
 pub use annotate::{AnnotationParameters, CutLines};
+pub use case::{Case, CaseError, CaseParameters, CaseTruth, Operation, pelvis_surface};
 pub use fluoroscopy::{FluoroscopyParameters, fluoroscopy};
 pub use movement::{Movement, MovementError, MovementParameters, RejectionCounts, sample_movement};
 pub use pick::{Pick, PickParameters};
