@@ -155,7 +155,9 @@ impl MovementParameters {
 pub struct RejectionCounts {
     /// The fragment's surface crosses the pelvis'.
     pub fragment_pelvis: u32,
-    /// The femur's surface crosses the pelvis'.
+    /// The femur's surface crosses the pelvis' when it moves as one body with the fragment.
+    pub joined_femur_pelvis: u32,
+    /// The femur's surface crosses the pelvis' with its own movement.
     pub femur_pelvis: u32,
     /// The femur's surface crosses the fragment's.
     pub femur_fragment: u32,
@@ -166,13 +168,18 @@ pub struct RejectionCounts {
 impl RejectionCounts {
     /// All rejections.
     pub fn total(&self) -> u32 {
-        self.fragment_pelvis + self.femur_pelvis + self.femur_fragment + self.containment
+        self.fragment_pelvis
+            + self.joined_femur_pelvis
+            + self.femur_pelvis
+            + self.femur_fragment
+            + self.containment
     }
 
     fn count(&mut self, pair: Pair, contact: Contact) {
         *match (contact, pair) {
             (Contact::Containment, _) => &mut self.containment,
             (Contact::Crossing, Pair::FragmentPelvis) => &mut self.fragment_pelvis,
+            (Contact::Crossing, Pair::JoinedFemurPelvis) => &mut self.joined_femur_pelvis,
             (Contact::Crossing, Pair::FemurPelvis) => &mut self.femur_pelvis,
             (Contact::Crossing, Pair::FemurFragment) => &mut self.femur_fragment,
         } += 1;
@@ -183,9 +190,13 @@ impl std::fmt::Display for RejectionCounts {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(
             f,
-            "{} fragment against pelvis, {} femur against pelvis, {} femur against fragment, \
-             {} one inside another",
-            self.fragment_pelvis, self.femur_pelvis, self.femur_fragment, self.containment
+            "{} fragment against pelvis, {} femur against pelvis as one body with the fragment, \
+             {} femur against pelvis, {} femur against fragment, {} one inside another",
+            self.fragment_pelvis,
+            self.joined_femur_pelvis,
+            self.femur_pelvis,
+            self.femur_fragment,
+            self.containment
         )
     }
 }

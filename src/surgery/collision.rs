@@ -65,14 +65,25 @@ pub struct CollisionError {
 /// Two bodies that may collide.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pair {
+    /// Fragment and pelvis, the fragment with its movement.
     FragmentPelvis,
+    /// Femur and pelvis, the femur with the FRAGMENT's movement: together with the pair before this
+    /// is the test of fragment and femur as one body against the pelvis.
+    JoinedFemurPelvis,
+    /// Femur and pelvis, each with its own movement.
     FemurPelvis,
+    /// Femur and fragment, each with its own movement.
     FemurFragment,
 }
 
 impl Pair {
     /// All of them, in the order in which they are tested.
-    pub const ALL: [Self; 3] = [Self::FragmentPelvis, Self::FemurPelvis, Self::FemurFragment];
+    pub const ALL: [Self; 4] = [
+        Self::FragmentPelvis,
+        Self::JoinedFemurPelvis,
+        Self::FemurPelvis,
+        Self::FemurFragment,
+    ];
 }
 
 /// How two bodies overlap.
@@ -175,6 +186,7 @@ impl CollisionModel {
         let bodies = &self.shrunk;
         let (fixed, moving, pose) = match pair {
             Pair::FragmentPelvis => (&bodies.pelvis, &bodies.fragment, *fragment),
+            Pair::JoinedFemurPelvis => (&bodies.pelvis, &bodies.femur, *fragment),
             Pair::FemurPelvis => (&bodies.pelvis, &bodies.femur, *femur),
             Pair::FemurFragment => (&bodies.fragment, &bodies.femur, fragment.inverse() * femur),
         };
