@@ -5,6 +5,7 @@ use super::surface_nets::surface_nets;
 use super::{Volume, surface_query::Index};
 use crate::geometry::{Point, Rigid, Vector};
 use serde::{Deserialize, Serialize};
+use std::sync::OnceLock;
 
 /// How a surface is made from a mask. First the mask is coarsened, then smoothed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -58,7 +59,8 @@ pub struct Surface {
     normals: Vec<Vector>,
     /// One vertex of each connected piece.
     pieces: Vec<u32>,
-    pub(super) index: Index,
+    /// Built at the first query: many surfaces are only moved or measured.
+    index: OnceLock<Index>,
 }
 
 impl std::fmt::Debug for Surface {
@@ -101,14 +103,19 @@ impl Surface {
     pub fn new(vertices: Vec<Point>, triangles: Vec<[u32; 3]>) -> Self {
         let normals = vertex_normals(&vertices, &triangles);
         let pieces = one_vertex_per_piece(vertices.len(), &triangles);
-        let index = Index::new(&vertices, &triangles);
         Self {
             vertices,
             triangles,
             normals,
             pieces,
-            index,
+            index: OnceLock::new(),
         }
+    }
+
+    /// The search tree of the triangles.
+    pub(super) fn index(&self) -> &Index {
+        self.index
+            .get_or_init(|| Index::new(&self.vertices, &self.triangles))
     }
 
     /// Positions in the surface's frame (the world for a mask's surface), mm.

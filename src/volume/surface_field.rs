@@ -62,28 +62,64 @@ fn half_kernel(sigma: f64) -> Vec<f32> {
 /// Convolves along one axis; zero outside. The two sides are added before they are weighted, so a
 /// mirrored mask gives the mirrored field to the last bit.
 fn smooth(field: &mut Volume<f32>, axis: usize, kernel: &[f32]) {
-    if kernel.len() < 2 {
-        return;
-    }
     let dims = field.grid.dims;
-    let stride = [1, dims[0], dims[0] * dims[1]][axis];
     let source = field.data.clone();
-    for (offset, value) in field.data.iter_mut().enumerate() {
-        let position = (offset / stride) % dims[axis];
-        let mut sum = source[offset] * kernel[0];
-        for (r, weight) in kernel.iter().enumerate().skip(1) {
-            let below = if position >= r {
-                source[offset - r * stride]
-            } else {
-                0.0
-            };
-            let above = if position + r < dims[axis] {
-                source[offset + r * stride]
-            } else {
-                0.0
-            };
-            sum += (below + above) * weight;
+    let stride = [1, dims[0], dims[0] * dims[1]][axis];
+    // A block is a run of memory that moves along the axis as a whole: one voxel, row or slice.
+    for (line, values) in field.data.chunks_mut(stride * dims[axis]).enumerate() {
+        let line = &source[line * stride * dims[axis]..][..stride * dims[axis]];
+        for (value, center) in values.iter_mut().zip(line) {
+            *value = center * kernel[0];
         }
-        *value = sum;
+        for (r, &weight) in kernel.iter().enumerate().skip(1) {
+            let shift = (r * stride).min(line.len());
+            let inner = line.len().saturating_sub(2 * shift);
+            // Near an end only one neighbour exists.
+            for at in 0..shift.min(line.len()) {
+                let other = at + shift;
+                values[at] += if other < line.len() { line[other] } else { 0.0 } * weight;
+            }
+            for at in shift..shift + inner {
+                values[at] += (line[at - shift] + line[at + shift]) * weight;
+            }
+            for at in (shift + inner).max(shift)..line.len() {
+                values[at] += line[at - shift] * weight;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Point;
+
+    /// Against the defining sum in all three dimensions.
+    #[test]
+    fn smoothing_is_a_convolution_with_a_gaussian() {
+        let grid = Grid::axis_aligned([3, 4, 5], 1.0, Point::origin());
+        let mask = Volume::new(grid.clone(), (0..60).map(|o| o * 7 % 5 < 2).collect());
+        let parameters = SurfaceParameters {
+            smoothing_voxels: 0.8,
+            ..Default::default()
+        };
+        let field = mask_field(&mask, |v| v, &parameters).unwrap();
+        let weight = |d: i64| (-0.5 * (d as f64 / 0.8).powi(2)).exp();
+        let total: f64 = (-3..=3).map(weight).sum();
+        for (offset, &value) in field.data.iter().enumerate() {
+            let at = field.grid.center(field.grid.voxel(offset));
+            let mut expected = 0.0;
+            for (o, &inside) in mask.data.iter().enumerate() {
+                let d = grid.center(grid.voxel(o)) - at;
+                if inside && d.iter().all(|c| c.abs() < 3.5) {
+                    let product: f64 = d.iter().map(|c| weight(c.round() as i64)).product();
+                    expected += product / total.powi(3);
+                }
+            }
+            assert!(
+                (f64::from(value) - expected).abs() < 1e-6,
+                "{value} {expected} at {at}"
+            );
+        }
     }
 }

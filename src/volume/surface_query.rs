@@ -64,7 +64,7 @@ impl Surface {
                 .is_some_and(|(_, leave)| leave >= 0.0)
         };
         let mut hits: Vec<Hit> = self
-            .index
+            .index()
             .tree
             .leaves(crossed)
             .filter_map(|triangle| {
@@ -107,7 +107,8 @@ impl Surface {
             let nearest = closest_on_triangle(point, &self.corners(triangle as usize));
             Some(((nearest - point).norm() as f32, nearest))
         };
-        let (triangle, (_, nearest)) = self.index.tree.find_best(f32::MAX, to_box, to_triangle)?;
+        let (triangle, (_, nearest)) =
+            self.index().tree.find_best(f32::MAX, to_box, to_triangle)?;
         Some((nearest, triangle as usize))
     }
 
@@ -123,9 +124,9 @@ impl Surface {
             let (my_low, my_high) = (double(mine.mins()), double(mine.maxs()));
             (0..3).all(|a| center[a] - half[a] <= my_high[a] && my_low[a] <= center[a] + half[a])
         };
-        self.index
+        self.index()
             .tree
-            .leaf_pairs(&other.index.tree, overlap)
+            .leaf_pairs(&other.index().tree, overlap)
             .any(|(mine, theirs)| {
                 let theirs = other.corners(theirs as usize).map(|p| self_from_other * p);
                 triangles_cross(&self.corners(mine as usize), &theirs)
