@@ -8,7 +8,7 @@ use pao_sim::anatomy::phantom::{PhantomParameters, phantom};
 use pao_sim::anatomy::{Hip, Label, Side};
 use pao_sim::geometry::{Point, PoseError, Rigid};
 use pao_sim::random::{Purpose, stream};
-use pao_sim::simulation::{Movement, MovementParameters, RejectionCounts, sample_movement};
+use pao_sim::simulation::{Movement, MovementParameters, MovementRejections, sample_movement};
 use pao_sim::surgery::collision::Pair;
 use pao_sim::surgery::{
     CollisionModel, Cut, FragmentParameters, NominalCutParameters, SurgeryMap, cut_fragment,
@@ -116,7 +116,7 @@ fn accepted_row(
 ) -> Result<(), Box<dyn Error>> {
     let start = Instant::now();
     let (mut rotations, mut translations) = (Vec::new(), Vec::new());
-    let mut counts = RejectionCounts::default();
+    let mut counts = MovementRejections::default();
     for Body { hip, model, .. } in bodies {
         let model = model.with_tolerance(tolerance_mm);
         for m in 0..movements {

@@ -20,7 +20,9 @@ mod testing;
 pub use annotate::{AnnotationParameters, CutLines};
 pub use case::{Case, CaseError, CaseParameters, CaseTruth, Operation, pelvis_surface};
 pub use fluoroscopy::{FluoroscopyParameters, fluoroscopy};
-pub use movement::{Movement, MovementError, MovementParameters, RejectionCounts, sample_movement};
+pub use movement::{
+    Movement, MovementError, MovementParameters, MovementRejections, sample_movement,
+};
 pub use pick::{Pick, PickParameters};
 pub use views::{ViewParameters, Views};
 pub use warp::{MovedAnatomy, WarpParameters};

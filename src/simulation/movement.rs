@@ -152,7 +152,7 @@ impl MovementParameters {
 
 /// How many draws were rejected, each counted under the first cause found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct RejectionCounts {
+pub struct MovementRejections {
     /// The fragment's surface crosses the pelvis'.
     pub fragment_pelvis: u32,
     /// The femur's surface crosses the pelvis' when it moves as one body with the fragment.
@@ -165,7 +165,7 @@ pub struct RejectionCounts {
     pub containment: u32,
 }
 
-impl RejectionCounts {
+impl MovementRejections {
     /// All rejections.
     pub fn total(&self) -> u32 {
         self.fragment_pelvis
@@ -186,7 +186,7 @@ impl RejectionCounts {
     }
 }
 
-impl std::fmt::Display for RejectionCounts {
+impl std::fmt::Display for MovementRejections {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(
             f,
@@ -212,7 +212,7 @@ pub enum MovementError {
     NoneFree {
         hip: String,
         draws: u32,
-        counts: RejectionCounts,
+        counts: MovementRejections,
         tolerance_mm: f64,
     },
     #[error(
@@ -223,7 +223,7 @@ pub enum MovementError {
     OverlapAtRest {
         hip: String,
         draws: u32,
-        counts: RejectionCounts,
+        counts: MovementRejections,
         pair: Pair,
         tolerance_mm: f64,
     },
@@ -239,8 +239,8 @@ pub fn sample_movement(
     hip: &Hip,
     parameters: &MovementParameters,
     stream: &mut Stream,
-) -> Result<(Movement, RejectionCounts), MovementError> {
-    let mut counts = RejectionCounts::default();
+) -> Result<(Movement, MovementRejections), MovementError> {
+    let mut counts = MovementRejections::default();
     for _ in 0..parameters.max_draws {
         let movement = parameters.draw(hip.side, stream);
         match collision.first_collision(&movement.fragment, &movement.femur) {
