@@ -1,18 +1,22 @@
-//! Statistics of random movements on phantom hips, with the nominal cuts: means, rejections by
-//! cause, sensitivity to the contact tolerance, and pictures of moved fragments.
+//! Statistics of random movements: means, rejections by cause and by size, where fragments collide,
+//! sensitivity to the contact tolerance, and pictures of moved fragments. It prints the tables of
+//! docs/movements.md.
 //!
-//! `cargo run --release --example movement_statistics -- [MOVEMENTS] [PHANTOMS] [PICTURE_FOLDER]`
-//! prints the tables of docs/movements.md (defaults: 300 movements a hip, 2 phantoms, no picture).
+//! `cargo run --release --example movement_statistics -- 1 2 --fragments 15 --movements 20`
+//!
+//! A specimen is the number of a phantom or a folder that `pao-sim specimen import` wrote.
 
+use clap::Parser;
+use pao_sim::anatomy::disk::read_specimen;
 use pao_sim::anatomy::phantom::{PhantomParameters, phantom};
 use pao_sim::anatomy::{Hip, Label, Side};
 use pao_sim::geometry::{Point, PoseError, Rigid};
-use pao_sim::random::{Purpose, stream};
+use pao_sim::random::{Purpose, Stream, stream};
 use pao_sim::simulation::{Movement, MovementParameters, MovementRejections, sample_movement};
 use pao_sim::surgery::collision::Pair;
 use pao_sim::surgery::{
-    CollisionModel, Cut, FragmentParameters, NominalCutParameters, SurgeryMap, cut_fragment,
-    nominal_cuts,
+    CollisionModel, Cut, FragmentParameters, FragmentSamplingParameters, NominalCutParameters,
+    SurgeryMap, cut_fragment, nominal_cuts, sample_fragment,
 };
 use pao_sim::volume::Volume;
 use std::error::Error;
@@ -20,76 +24,117 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// A hip with its nominal surgery.
+#[derive(Parser)]
+struct Arguments {
+    /// Phantom numbers or specimen folders.
+    #[arg(required = true)]
+    specimens: Vec<String>,
+    /// Random fragments a hip; 0 takes the nominal one.
+    #[arg(long, default_value_t = 0)]
+    fragments: usize,
+    /// Movements a fragment.
+    #[arg(long, default_value_t = 20)]
+    movements: usize,
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder for pictures of each hip's first fragment.
+    #[arg(long)]
+    pictures: Option<PathBuf>,
+}
+
+/// One surgery.
 struct Body {
     hip: Hip,
+    /// `phantom-1/left/f00`.
+    key: String,
     model: CollisionModel,
     map: SurgeryMap,
 }
 
-/// Tolerances in mm whose effect is shown; the second is the default.
+/// Tolerances in mm whose effect is shown.
 const TOLERANCES_MM: [f64; 4] = [0.0, 0.5, 1.0, 2.0];
-const SEED: u64 = 1;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut arguments = std::env::args().skip(1);
-    let movements: usize = arguments.next().map_or(Ok(300), |a| a.parse())?;
-    let phantoms: u32 = arguments.next().map_or(Ok(2), |a| a.parse())?;
-    let pictures = arguments.next().map(PathBuf::from);
-
+    let arguments = Arguments::parse();
     let mut bodies = Vec::new();
-    for number in 1..=phantoms {
-        let specimen = Arc::new(phantom(number, &PhantomParameters::default()));
+    for name in &arguments.specimens {
+        let specimen = Arc::new(match name.parse() {
+            Ok(number) => phantom(number, &PhantomParameters::default()),
+            Err(_) => read_specimen(Path::new(name))?,
+        });
         for side in Side::BOTH {
             let hip = Hip::new(specimen.clone(), side)?;
-            let cuts = nominal_cuts(&hip, &NominalCutParameters::default())?;
-            let map = cut_fragment(&hip, &cuts, &FragmentParameters::default())?;
-            let start = Instant::now();
-            let model = CollisionModel::new(&hip, &map.labels, &Default::default())?;
-            println!(
-                "{}: fragment {:.1} cm^3, collision model in {:.1} s",
-                hip.key(),
-                map.fragment_cm3(),
-                start.elapsed().as_secs_f64()
-            );
-            if let Some(folder) = &pictures {
+            bodies.extend(surgeries(&hip, &arguments)?);
+            if let Some(folder) = &arguments.pictures {
                 std::fs::create_dir_all(folder)?;
-                draw(&hip, &map.labels, &model, folder)?;
+                let first = bodies.len() - arguments.fragments.max(1);
+                draw(&bodies[first], folder, arguments.seed)?;
             }
-            bodies.push(Body { hip, model, map });
         }
     }
-
     println!("\n## All draws\n");
-    pair_table(&bodies, movements);
+    pair_table(&bodies, &arguments);
     println!("\n## Where rejected fragments overlap the pelvis\n");
-    place_table(&bodies, movements);
+    place_table(&bodies, &arguments);
     println!("\n## Accepted movements, by axis\n");
-    axis_table(&bodies, movements)?;
+    axis_table(&bodies, &arguments)?;
     println!("\n## Accepted movements\n");
     println!(
-        "| hips | tolerance mm | rotation deg | translation mm | accepted | fragment-pelvis | joined femur-pelvis | femur-pelvis | femur-fragment | containment | ms a draw |"
+        "| fragments | tolerance mm | rotation deg | translation mm | accepted | fragment-pelvis \
+         | joined femur-pelvis | femur-pelvis | femur-fragment | containment | ms a draw |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|");
-    for body in &bodies {
-        accepted_row(&body.hip.key(), std::slice::from_ref(body), 0.5, movements)?;
+    for hip in bodies.chunk_by(|a, b| a.hip.key() == b.hip.key()) {
+        accepted_row(&hip[0].hip.key(), hip, 0.5, &arguments)?;
     }
     for tolerance in TOLERANCES_MM {
-        accepted_row("all", &bodies, tolerance, movements)?;
+        accepted_row("all", &bodies, tolerance, &arguments)?;
     }
     Ok(())
 }
 
+/// The nominal surgery of a hip, or random ones.
+fn surgeries(hip: &Hip, arguments: &Arguments) -> Result<Vec<Body>, Box<dyn Error>> {
+    let cuts = nominal_cuts(hip, &NominalCutParameters::default())?;
+    let mut bodies = Vec::new();
+    for f in 0..arguments.fragments.max(1) {
+        let key = format!("{}/f{f:02}", hip.key());
+        let map = if arguments.fragments == 0 {
+            cut_fragment(hip, &cuts, &FragmentParameters::default())?
+        } else {
+            let parameters = FragmentSamplingParameters::default();
+            sample_fragment(hip, &cuts, &parameters, arguments.seed, &key)?.0
+        };
+        let start = Instant::now();
+        let model = CollisionModel::new(hip, &map.labels, &Default::default())?;
+        eprintln!(
+            "{key}: fragment of {:.1} cm^3, collision model in {:.1} s",
+            map.fragment_cm3(),
+            start.elapsed().as_secs_f64()
+        );
+        bodies.push(Body {
+            hip: hip.clone(),
+            key,
+            model,
+            map,
+        });
+    }
+    Ok(bodies)
+}
+
 /// How often each pair overlaps, by the rotation angle of the draw, at the default tolerance.
-fn pair_table(bodies: &[Body], draws: usize) {
+fn pair_table(bodies: &[Body], arguments: &Arguments) {
     println!(
         "| rotation deg | draws | free | fragment-pelvis | joined femur-pelvis | femur-pelvis | femur-fragment |"
     );
     println!("|---|---|---|---|---|---|---|");
     let mut bins = [[0usize; 6]; 7];
-    for Body { hip, model, .. } in bodies {
-        let mut stream = stream(SEED, Purpose::Movement, &format!("{}/draws", hip.key()));
-        for _ in 0..draws {
+    for Body {
+        hip, key, model, ..
+    } in bodies
+    {
+        let mut stream = draws_of(key, arguments.seed);
+        for _ in 0..arguments.movements {
             let m = MovementParameters::default().draw(hip.side, &mut stream);
             let bin = (PoseError::of(&m.fragment).rotation_deg / 5.0) as usize;
             let hits = Pair::ALL.map(|p| model.contact(p, &m.fragment, &m.femur).is_some());
@@ -112,19 +157,19 @@ fn accepted_row(
     name: &str,
     bodies: &[Body],
     tolerance_mm: f64,
-    movements: usize,
+    arguments: &Arguments,
 ) -> Result<(), Box<dyn Error>> {
     let start = Instant::now();
     let (mut rotations, mut translations) = (Vec::new(), Vec::new());
     let mut counts = MovementRejections::default();
-    for Body { hip, model, .. } in bodies {
+    for Body {
+        hip, key, model, ..
+    } in bodies
+    {
         let model = model.with_tolerance(tolerance_mm);
-        for m in 0..movements {
-            let mut stream = stream(
-                SEED,
-                Purpose::Movement,
-                &format!("{}/f00/m{m:02}", hip.key()),
-            );
+        for m in 0..arguments.movements {
+            let key = format!("{key}/m{m:02}");
+            let mut stream = stream(arguments.seed, Purpose::Movement, &key);
             let (movement, rejected) =
                 sample_movement(&model, hip, &MovementParameters::default(), &mut stream)?;
             let size = PoseError::of(&movement.fragment);
@@ -157,17 +202,23 @@ fn accepted_row(
 
 /// For draws whose fragment overlaps the pelvis: the cut next to which most of its voxels lie in
 /// the pelvis. These are the labels as they are, not opened.
-fn place_table(bodies: &[Body], draws: usize) {
+fn place_table(bodies: &[Body], arguments: &Arguments) {
     let mut counts = [0usize; 4];
-    for Body { hip, model, map } in bodies {
+    for Body {
+        hip,
+        key,
+        model,
+        map,
+    } in bodies
+    {
         let app_from_volume = hip.app_from_volume;
         let grid = &map.labels.grid;
         let fragment: Vec<Point> = (0..map.labels.data.len())
             .filter(|&o| map.labels.data[o] == Label::Fragment.value())
             .map(|o| app_from_volume * grid.center(grid.voxel(o)))
             .collect();
-        let mut stream = stream(SEED, Purpose::Movement, &format!("{}/draws", hip.key()));
-        for _ in 0..draws {
+        let mut stream = draws_of(key, arguments.seed);
+        for _ in 0..arguments.movements {
             let m = MovementParameters::default().draw(hip.side, &mut stream);
             if model
                 .contact(Pair::FragmentPelvis, &m.fragment, &m.femur)
@@ -203,9 +254,12 @@ fn place_table(bodies: &[Body], draws: usize) {
 }
 
 /// Means and SDs of the drawn quantities, all and accepted, with the signs of Table S-5.
-fn axis_table(bodies: &[Body], movements: usize) -> Result<(), Box<dyn Error>> {
+fn axis_table(bodies: &[Body], arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let (mut accepted, mut drawn) = (vec![Vec::new(); 6], vec![Vec::new(); 6]);
-    for Body { hip, model, .. } in bodies {
+    for Body {
+        hip, key, model, ..
+    } in bodies
+    {
         let s = hip.side.lateral_sign();
         let components = |m: &Movement| {
             let e = PoseError::of(&m.fragment);
@@ -213,11 +267,14 @@ fn axis_table(bodies: &[Body], movements: usize) -> Result<(), Box<dyn Error>> {
             [r.x, s * r.y, -s * r.z, -s * t.x, t.y, t.z]
         };
         let parameters = MovementParameters::default();
-        for m in 0..movements {
-            let key = format!("{}/f00/m{m:02}", hip.key());
-            let mut draws = stream(SEED, Purpose::Movement, &key);
+        for m in 0..arguments.movements {
+            let key = format!("{key}/m{m:02}");
+            let mut draws = stream(arguments.seed, Purpose::Movement, &key);
             let (free, _) = sample_movement(model, hip, &parameters, &mut draws)?;
-            let any = parameters.draw(hip.side, &mut stream(SEED, Purpose::Movement, &key));
+            let any = parameters.draw(
+                hip.side,
+                &mut stream(arguments.seed, Purpose::Movement, &key),
+            );
             for i in 0..6 {
                 accepted[i].push(components(&free)[i]);
                 drawn[i].push(components(&any)[i]);
@@ -253,40 +310,33 @@ fn mean_and_sd(values: &[f64]) -> String {
 
 /// Coronal, sagittal and axial slices through the head, before a movement, after the first
 /// accepted one, and after the first draw in which a pair overlaps, for each pair.
-fn draw(
-    hip: &Hip,
-    labels: &Volume<u8>,
-    model: &CollisionModel,
-    folder: &Path,
-) -> Result<(), Box<dyn Error>> {
+fn draw(body: &Body, folder: &Path, seed: u64) -> Result<(), Box<dyn Error>> {
+    let Body {
+        hip, model, map, ..
+    } = body;
     let name = hip.key().replace('/', "-");
-    picture(
-        hip,
-        labels,
-        &Movement::identity(),
-        &folder.join(format!("{name}-rest.png")),
-    )?;
+    let file = |what: &str| folder.join(format!("{name}-{what}.png"));
+    picture(hip, &map.labels, &Movement::identity(), &file("rest"))?;
     let parameters = MovementParameters::default();
-    let mut draws = stream(SEED, Purpose::Movement, &format!("{}/picture", hip.key()));
+    let mut draws = stream(seed, Purpose::Movement, &format!("{name}/picture"));
     let (free, _) = sample_movement(model, hip, &parameters, &mut draws)?;
-    picture(
-        hip,
-        labels,
-        &free,
-        &folder.join(format!("{name}-moved.png")),
-    )?;
+    picture(hip, &map.labels, &free, &file("moved"))?;
     for pair in Pair::ALL {
         for _ in 0..500 {
             let m = parameters.draw(hip.side, &mut draws);
             if model.contact(pair, &m.fragment, &m.femur).is_some() {
-                let path = folder.join(format!("{name}-{pair:?}.png"));
-                println!("{}: {:?}", path.display(), PoseError::of(&m.fragment));
-                picture(hip, labels, &m, &path)?;
+                let path = file(&format!("{pair:?}"));
+                eprintln!("{}: {:?}", path.display(), PoseError::of(&m.fragment));
+                picture(hip, &map.labels, &m, &path)?;
                 break;
             }
         }
     }
     Ok(())
+}
+
+fn draws_of(key: &str, seed: u64) -> Stream {
+    stream(seed, Purpose::Movement, &format!("{key}/draws"))
 }
 
 /// Half the edge of a slice in mm, and pixels per mm.
