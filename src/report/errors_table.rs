@@ -79,6 +79,9 @@ pub fn table1(rows: &Rows) -> Result<Table, StatisticsError> {
     })
 }
 
+/// An interval from fewer cases would say nothing.
+const FEWEST_CASES: usize = 5;
+
 /// Medians with 95 % bootstrap intervals (whole cases are resampled), and quartiles.
 ///
 /// # Errors
@@ -103,6 +106,14 @@ pub fn medians(rows: &Rows, seed: u64) -> Result<Table, StatisticsError> {
             }
             let values = absolute(&own, column);
             let median = Summary::of(&values)?.median;
+            if cases
+                .iter()
+                .max()
+                .is_none_or(|last| last + 1 < FEWEST_CASES)
+            {
+                line.push(format!("{median:.2}"));
+                continue;
+            }
             let key = format!("{scenario}/{column}");
             let kind = IntervalKind::Percentile;
             let interval = median_interval(&values, &cases, 0.95, 2000, kind, (seed, &key))?;
@@ -118,7 +129,7 @@ pub fn medians(rows: &Rows, seed: u64) -> Result<Table, StatisticsError> {
         title: "Medians of absolute errors".into(),
         header,
         rows: body,
-        notes: vec!["Intervals: percentile bootstrap over cases, 2000 resamples.".into()],
+        notes: vec!["Intervals: percentile bootstrap over cases, 2000 resamples; none for fewer than 5 cases.".into()],
     })
 }
 

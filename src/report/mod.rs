@@ -1,13 +1,18 @@
 //! Tables, figures and the page that a study ends in.
 
 pub mod canvas;
+pub mod effort_table;
 pub mod errors_table;
 pub mod histograms;
+pub mod numbers;
 pub mod offsets_table;
 pub mod reference;
 pub mod rows;
+pub mod sampling_table;
 pub mod table;
 pub mod tests_table;
+pub mod write;
 
-pub use rows::Rows;
+pub use rows::{Rows, RowsError};
 pub use table::Table;
+pub use write::{About, Group, ReportError, write};

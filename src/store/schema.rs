@@ -217,6 +217,11 @@ impl Schema {
             Kind::Integer,
             "Movements that collided before this one",
         );
+        self.result(
+            "overlap_voxels",
+            Kind::Integer,
+            "Voxels where moved bone fell on bone that stays: the collision tolerance lets few through",
+        );
     }
 
     fn estimates(&mut self) {

@@ -5,13 +5,16 @@
 
 use super::key::is_name;
 use super::{Scenario, StrategyParameters};
-use crate::anatomy::Side;
+use crate::anatomy::phantom::PhantomParameters;
+use crate::anatomy::{LceApex, Side};
 use crate::geometry::{Point, Vector};
 use crate::simulation::{
-    FluoroscopyParameters, MovementParameters, PickParameters, ViewParameters, WarpParameters,
+    AnnotationParameters, FluoroscopyParameters, MovementParameters, PickParameters,
+    ViewParameters, WarpParameters, WireInsertionParameters,
 };
 use crate::surgery::{
-    CollisionParameters, FragmentParameters, KWireParameters, NominalCutParameters,
+    CollisionParameters, FragmentParameters, FragmentSamplingParameters, KWireParameters,
+    NominalCutParameters, PlausibilityParameters, RandomCutParameters,
 };
 use crate::xray::{AttenuationParameters, Camera, Orbit};
 use nalgebra::Unit;
@@ -78,6 +81,8 @@ pub struct PopulationSection {
     pub specimens: Vec<PathBuf>,
     /// Sides that are operated on. Default both.
     pub sides: Vec<Side>,
+    /// What the phantom bodies are like.
+    pub phantom: PhantomParameters,
 }
 
 impl Default for PopulationSection {
@@ -86,6 +91,7 @@ impl Default for PopulationSection {
             phantoms: (1..=6).collect(),
             specimens: Vec::new(),
             sides: Side::BOTH.to_vec(),
+            phantom: PhantomParameters::default(),
         }
     }
 }
@@ -157,16 +163,38 @@ pub struct SurgerySection {
     pub fragments: u32,
     /// Where the planned cuts lie.
     pub nominal: NominalCutParameters,
+    /// How far random cuts are from the planned ones.
+    pub random_cuts: RandomCutParameters,
     /// How cuts become a fragment.
     pub fragment: FragmentParameters,
+    /// Which fragments are taken.
+    pub plausibility: PlausibilityParameters,
+    /// Random cuts after which a fragment is given up. Default 2000.
+    pub max_draws: usize,
 }
 
 impl Default for SurgerySection {
     fn default() -> Self {
+        let sampling = FragmentSamplingParameters::default();
         Self {
             fragments: 15,
             nominal: NominalCutParameters::default(),
-            fragment: FragmentParameters::default(),
+            random_cuts: sampling.random_cuts,
+            fragment: sampling.fragment,
+            plausibility: sampling.plausibility,
+            max_draws: sampling.max_draws,
+        }
+    }
+}
+
+impl SurgerySection {
+    /// How fragments are drawn.
+    pub fn sampling(&self) -> FragmentSamplingParameters {
+        FragmentSamplingParameters {
+            random_cuts: self.random_cuts.clone(),
+            fragment: self.fragment.clone(),
+            plausibility: self.plausibility.clone(),
+            max_draws: self.max_draws,
         }
     }
 }
@@ -181,6 +209,9 @@ pub struct MovementSection {
     pub sampling: MovementParameters,
     /// What counts as a collision.
     pub collision: CollisionParameters,
+    /// Where the LCE angle's apex lies after the operation: `preoperative_head` (default) or
+    /// `moved_head`.
+    pub lce_apex: LceApex,
 }
 
 impl Default for MovementSection {
@@ -189,6 +220,7 @@ impl Default for MovementSection {
             movements: 20,
             sampling: MovementParameters::default(),
             collision: CollisionParameters::default(),
+            lce_apex: LceApex::default(),
         }
     }
 }
@@ -204,11 +236,15 @@ pub struct XraySection {
     pub views: ViewParameters,
     /// The K-wires that hold the fragment.
     pub wires: KWireParameters,
+    /// How the wires get into the volume.
+    pub wire_insertion: WireInsertionParameters,
     /// What fills the voxels that bone left.
     pub warp: WarpParameters,
     pub fluoroscopy: FluoroscopyParameters,
     /// The noisy pick of the landmark.
     pub pick: PickParameters,
+    /// How cut lines are annotated.
+    pub annotation: AnnotationParameters,
 }
 
 /// The C-arm's geometry; the Siemens CIOS Fusion by default (paper, section on registration; facts
@@ -410,9 +446,11 @@ impl Config {
         }
         p.distinct("population.sides", &population.sides);
 
+        p.nest("population.phantom", population.phantom.problems());
+
         p.count("surgery.fragments", self.surgery.fragments);
         p.nest("surgery.nominal", self.surgery.nominal.problems());
-        p.nest("surgery.fragment", self.surgery.fragment.problems());
+        p.nest("surgery", self.surgery.sampling().problems());
         p.count("movement.movements", self.movement.movements);
         p.nest("movement.sampling", self.movement.sampling.problems());
         p.nest("movement.collision", self.movement.collision.problems());
@@ -422,9 +460,11 @@ impl Config {
         p.nest("xray.attenuation", xray.attenuation.problems());
         p.nest("xray.views", xray.views.problems());
         p.nest("xray.wires", xray.wires.problems());
+        p.nest("xray.wire_insertion", xray.wire_insertion.problems());
         p.nest("xray.warp", xray.warp.problems());
         p.nest("xray.fluoroscopy", xray.fluoroscopy.problems());
         p.nest("xray.pick", xray.pick.problems());
+        p.nest("xray.annotation", xray.annotation.problems());
 
         for (name, strategy) in &self.registration {
             let section = format!("registration.{name}");

@@ -154,6 +154,12 @@ impl StudyFolder {
         }
     }
 
+    /// True while another process has the lock.
+    pub fn is_locked(&self) -> bool {
+        let file = File::open(self.path.join("lock"));
+        file.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+    }
+
     /// Writes a small file at once or not at all.
     ///
     /// # Errors

@@ -2,10 +2,10 @@
 
 use super::folder::{StudyError, StudyFolder, io};
 use super::runner::{Ending, Event, RunOptions, run};
+use super::snapshot::{provenances, select_simd, write_table};
 use super::{Config, Plan, Provenance, State, Worker};
-use crate::simd::SimdLevel;
 use crate::store::journal::{self, Writer};
-use crate::store::{COMPLETE, Record, Row, SET_ASIDE, write_parquet};
+use crate::store::{COMPLETE, Record, Row, SET_ASIDE};
 use serde_json::{Value, json};
 use std::fs::File;
 use std::path::Path;
@@ -60,14 +60,8 @@ impl Study {
         let folder = StudyFolder::of(results, &config.study.name);
         let lock = folder.lock()?;
         let journals = journal::read_all(&folder.journals())?;
-        let earlier: Vec<Provenance> = journals
-            .iter()
-            .filter_map(|journal| journal.header.as_ref())
-            .filter_map(|header| serde_json::from_value(header.provenance.clone()).ok())
-            .collect();
-        if let Some(first) = earlier.first() {
-            SimdLevel::select(first.simd)?;
-        }
+        let earlier = provenances(&journals);
+        select_simd(&journals)?;
         check_unchanged(&folder, &config, &earlier, options)?;
         let file = folder.config_file();
         folder.write(&file, &config.to_toml())?;
@@ -142,26 +136,23 @@ impl Study {
         for row in committed.into_inner().expect("no thread panicked") {
             self.state.insert(row);
         }
-        self.write_table()?;
+        write_table(&self.folder, &self.plan, &self.state)?;
         self.write_manifest()?;
         Ok(self.outcome(ending))
     }
 
-    /// Writes `registrations.parquet` from every row of the plan that is there, in the plan's order.
-    ///
-    /// # Errors
-    /// When it cannot be written.
-    pub fn write_table(&self) -> Result<(), StudyError> {
-        let rows: Vec<&Row> = self.state.planned_rows(&self.plan).collect();
-        Ok(write_parquet(&self.folder.table(), &rows)?)
+    /// How many registrations of the plan count as done, and how many of those failed.
+    pub fn counted(&self, redo: Redo) -> (usize, usize) {
+        let rows = || self.state.planned_rows(&self.plan);
+        let failed = rows().filter(|row| row.text("status") != COMPLETE).count();
+        match redo {
+            Redo::Nothing => (rows().count(), failed),
+            Redo::Failed => (rows().count() - failed, 0),
+        }
     }
 
     fn outcome(&self, ending: Ending) -> Outcome {
-        let (mut done, mut failed) = (0, 0);
-        for row in self.state.planned_rows(&self.plan) {
-            done += 1;
-            failed += usize::from(row.text("status") != COMPLETE);
-        }
+        let (done, failed) = self.counted(Redo::Nothing);
         Outcome {
             ending,
             planned: self.plan.len(),

@@ -1,0 +1,63 @@
+//! Failures of commands, and the exit codes.
+
+use pao_sim::study::{KeyError, StudyError};
+
+/// The documented exit codes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Exit {
+    /// All was done.
+    Complete = 0,
+    /// Something went wrong.
+    Error = 1,
+    /// The command line or the configuration is wrong.
+    Usage = 2,
+    /// All was done, and some rows say why they failed.
+    FailedRows = 3,
+    /// Stopped early; the same command continues.
+    Stopped = 75,
+}
+
+/// A command that could not do its work.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    #[error(transparent)]
+    Study(#[from] StudyError),
+    #[error(transparent)]
+    Key(#[from] KeyError),
+    #[error(transparent)]
+    Rows(#[from] pao_sim::report::RowsError),
+    #[error(transparent)]
+    Report(#[from] pao_sim::report::ReportError),
+    #[error("the study has no registration {0}; `pao-sim plan` tells what it consists of")]
+    NotPlanned(String),
+    #[error("cannot {action}: {cause}")]
+    Io {
+        action: String,
+        #[source]
+        cause: std::io::Error,
+    },
+}
+
+impl Failure {
+    /// The exit code that it ends the program with.
+    pub fn exit(&self) -> Exit {
+        match self {
+            Self::Study(
+                StudyError::Config(_)
+                | StudyError::NoStudy { .. }
+                | StudyError::NotBegun { .. }
+                | StudyError::Mixed { .. },
+            )
+            | Self::Key(_)
+            | Self::NotPlanned(_) => Exit::Usage,
+            _ => Exit::Error,
+        }
+    }
+}
+
+impl From<pao_sim::study::ConfigError> for Failure {
+    fn from(error: pao_sim::study::ConfigError) -> Self {
+        Self::Study(error.into())
+    }
+}

@@ -1,0 +1,14 @@
+//! The command line: one file a subcommand. Each parses, calls the library and prints.
+
+mod args;
+mod error;
+mod logging;
+mod plan;
+mod progress;
+mod replay;
+mod report;
+mod run;
+mod status;
+mod stop;
+
+pub use args::main;

@@ -1,0 +1,94 @@
+//! `pao-sim plan`: counts and rough cost before anything runs.
+
+use super::args::Common;
+use super::error::{Exit, Failure};
+use super::progress::duration;
+use pao_sim::study::{Config, Plan, Snapshot, Status, StudyFolder};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Count what a study consists of, before anything runs.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Configuration file.
+    config: PathBuf,
+}
+
+/// Bytes of a row in journal and table together, measured.
+const BYTES_A_ROW: f64 = 2000.0;
+
+pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let config = Config::read(&arguments.config)?;
+    let plan = Plan::of(&config);
+    let status = StudyFolder::find(&arguments.config, &common.results)
+        .and_then(Snapshot::read)
+        .map(|snapshot| Status::of(&snapshot))
+        .ok();
+    let seconds = status.as_ref().and_then(|status| {
+        let (each, case) = (status.registration_seconds?, status.simulation_seconds?);
+        Some(each * plan.len() as f64 + case * plan.cases.len() as f64)
+    });
+    let megabytes = BYTES_A_ROW * plan.len() as f64 / 1e6;
+    if common.json {
+        let cells = plan.cells().into_iter();
+        let cells: Vec<_> = cells
+            .map(|(scenario, strategy, registrations)| {
+                json!({"scenario": scenario.name(), "strategy": strategy, "registrations": registrations})
+            })
+            .collect();
+        let plan = json!({
+            "study": config.study.name,
+            "specimens": plan.specimens.iter().map(|s| s.name()).collect::<Vec<_>>(),
+            "cases": plan.cases.len(),
+            "registrations": plan.len(),
+            "cells": cells,
+            "thread_seconds": seconds,
+            "megabytes": megabytes,
+        });
+        println!("{plan}");
+        return Ok(Exit::Complete);
+    }
+    println!(
+        "study {}: {} registrations of {} cases",
+        config.study.name,
+        plan.len(),
+        plan.cases.len()
+    );
+    if !config.study.reduced.is_empty() {
+        println!("REDUCED: {}", config.study.reduced);
+    }
+    let names: Vec<String> = plan
+        .specimens
+        .iter()
+        .map(|specimen| specimen.name())
+        .collect();
+    println!(
+        "  {} specimens ({}) x {} sides x {} fragments x {} movements x {} initializations",
+        names.len(),
+        names.join(", "),
+        config.population.sides.len(),
+        config.surgery.fragments,
+        config.movement.movements,
+        config.study.initializations
+    );
+    println!(
+        "\n  {:<24}{:<16}{:>14}",
+        "scenario", "strategy", "registrations"
+    );
+    for (scenario, strategy, registrations) in plan.cells() {
+        println!("  {:<24}{strategy:<16}{registrations:>14}", scenario.name());
+    }
+    println!();
+    match (seconds, status) {
+        (Some(seconds), Some(status)) => println!(
+            "cost: {} of one thread, going by the {} registrations that are there",
+            duration(seconds),
+            status.done
+        ),
+        _ => println!(
+            "cost: not known before the first registrations; `pao-sim status` tells it then"
+        ),
+    }
+    println!("disk: about {megabytes:.1} MB in a few files");
+    Ok(Exit::Complete)
+}

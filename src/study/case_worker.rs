@@ -1,0 +1,134 @@
+//! The real work: simulates cases, registers them, compares with the truth.
+
+use super::preparation::{Preparation, PreparedFragment};
+use super::record;
+use super::{CaseKey, Config, Failure, RegistrationKey, Scenario, StrategyParameters, Worker};
+use crate::random::{Purpose, stream};
+use crate::registration::paper::Paper;
+use crate::registration::{Shape, Strategy};
+use crate::simulation::case::{Case, CaseParameters};
+use crate::simulation::sample_movement;
+use crate::store::Row;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Simulates and registers as a configuration says.
+#[derive(Debug)]
+pub struct CaseWorker {
+    config: Arc<Config>,
+    preparation: Preparation,
+    strategies: BTreeMap<String, Box<dyn Strategy + Send>>,
+    parameters: CaseParameters,
+}
+
+/// A simulated case, with what its fragment and hip share.
+#[derive(Debug)]
+pub struct SimulatedCase {
+    pub fragment: Arc<PreparedFragment>,
+    pub case: Case,
+    /// Movements that collided before this one.
+    pub movement_rejections: u32,
+}
+
+impl CaseWorker {
+    /// A worker of a configuration. Nothing is read or made before the first case.
+    pub fn new(config: &Config) -> Self {
+        let config = Arc::new(config.clone());
+        let strategies = config.registration.iter();
+        let strategies = strategies.map(|(name, parameters)| (name.clone(), strategy(parameters)));
+        let xray = &config.xray;
+        Self {
+            preparation: Preparation::new(config.clone()),
+            strategies: strategies.collect(),
+            parameters: CaseParameters {
+                camera: xray.c_arm.camera(),
+                orbit: xray.c_arm.orbit(),
+                attenuation: xray.attenuation.clone(),
+                views: xray.views.clone(),
+                warp: xray.warp.clone(),
+                wire_insertion: xray.wire_insertion.clone(),
+                fluoroscopy: xray.fluoroscopy.clone(),
+                annotation: xray.annotation.clone(),
+            },
+            config,
+        }
+    }
+
+    /// What a scenario gives a registration to know of the fragment's shape.
+    fn shape(&self, case: &SimulatedCase, scenario: Scenario) -> Result<Shape, Failure> {
+        let (fragment, hip) = (&case.fragment, &case.fragment.hip);
+        if scenario != Scenario::IliumPubisEstimated {
+            return Ok(Shape::Given(fragment.models(scenario)?));
+        }
+        Ok(Shape::Estimated {
+            full_pelvis: hip.full_pelvis()?,
+            femur: hip.femur()?,
+            pelvis_surface: hip.pelvis_surface.clone(),
+            nominal: hip.nominal,
+            annotations: case.case.annotations().clone(),
+            recipe: hip.recipe.clone(),
+        })
+    }
+}
+
+fn strategy(parameters: &StrategyParameters) -> Box<dyn Strategy + Send> {
+    match parameters {
+        StrategyParameters::Paper(parameters) => Box::new(Paper {
+            parameters: parameters.clone(),
+        }),
+    }
+}
+
+impl Worker for CaseWorker {
+    type Case = SimulatedCase;
+
+    fn simulate(&self, key: &CaseKey) -> Result<SimulatedCase, Failure> {
+        let fragment = self.preparation.fragment(&key.fragment)?;
+        let (seed, name) = (self.config.study.seed, key.to_string());
+        let (movement, rejections) = sample_movement(
+            &fragment.collision,
+            &fragment.hip.hip,
+            &self.config.movement.sampling,
+            &mut stream(seed, Purpose::Movement, &name),
+        )
+        .map_err(|cause| Failure::new("movement", cause))?;
+        let case = Case::simulate(
+            &fragment.operation,
+            &movement,
+            &self.parameters,
+            seed,
+            &name,
+        )
+        .map_err(|cause| Failure::new("simulation", cause))?;
+        Ok(SimulatedCase {
+            fragment,
+            case,
+            movement_rejections: rejections.total(),
+        })
+    }
+
+    fn register(
+        &self,
+        case: &SimulatedCase,
+        key: &RegistrationKey,
+        row: &mut Row,
+    ) -> Result<(), Failure> {
+        let apex = self.config.movement.lce_apex;
+        record::truth(case, apex, row)?;
+        let name = key.initialization_key();
+        let pick = case.case.pick(&self.config.xray.pick, &name);
+        record::pick(case, &pick, row);
+        let shape = self.shape(case, key.scenario)?;
+        let observation = case.case.observation(&pick, shape, name);
+        let strategy = self.strategies.get(&key.strategy).ok_or_else(|| {
+            Failure::new(
+                "strategy",
+                format!("the study has no strategy {}", key.strategy),
+            )
+        })?;
+        let outcome = strategy
+            .register(&observation)
+            .map_err(|error| Failure::new(error.phase, error.cause))?;
+        record::outcome(case, key.scenario, &outcome, apex, row)
+    }
+}
