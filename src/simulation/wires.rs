@@ -230,7 +230,7 @@ mod tests {
             (Vector::new(0.3, -0.4, -0.8), 1.5),
         ] {
             let wire = wire(center + direction.normalize() * 30.0, direction, radius);
-            let result = insert_into(Volume::filled(grid.clone(), 0.0), &[wire.clone()]);
+            let result = insert_into(Volume::filled(grid.clone(), 0.0), &[wire]);
             let expected = volume_mm3(&wire) * mu();
             let ratio = total(&result) / expected;
             assert!((ratio - 1.0).abs() < 0.01, "radius {radius}: {ratio}");
@@ -246,7 +246,7 @@ mod tests {
             Vector::new(1.0, 0.1, 0.2),
             1.5,
         );
-        let result = insert_into(Volume::filled(grid.clone(), tissue as f32), &[wire.clone()]);
+        let result = insert_into(Volume::filled(grid.clone(), tissue as f32), &[wire]);
         let before = tissue * grid.len() as f64;
         let expected = before + volume_mm3(&wire) * (mu() - tissue);
         let gained = (total(&result) - before) / (expected - before);

@@ -121,7 +121,7 @@ fn line_integrals(
         });
     }
     let crop_px = parameters.crop_px;
-    let left = |size: usize| size.checked_sub(2 * crop_px).unwrap_or(0) as f64;
+    let left = |size: usize| size.saturating_sub(2 * crop_px) as f64;
     let smallest = left(width).min(left(height)) * factor;
     if !(factor > 0.0 && factor <= 1.0 && (smallest + 0.5).floor() >= 1.0) {
         return Err(PyramidError::NothingLeft {

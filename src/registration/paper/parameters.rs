@@ -283,8 +283,10 @@ mod tests {
 
     #[test]
     fn every_wrong_value_is_named() {
-        let mut p = PaperParameters::default();
-        p.step_mm = 0.0;
+        let mut p = PaperParameters {
+            step_mm: 0.0,
+            ..PaperParameters::default()
+        };
         p.femur.population = 1;
         p.landmark_view.box_rotation_deg[2] = f64::NAN;
         let fields: Vec<String> = p.problems().into_iter().map(|(field, _)| field).collect();

@@ -148,7 +148,7 @@ mod tests {
         row.set("specimen", "phantom-1");
         row.set("fragment", number);
         row.set("rotation_error_deg", 0.1 * f64::from(number));
-        row.set("view1_cmaes_capped", number % 2 == 0);
+        row.set("view1_cmaes_capped", number.is_multiple_of(2));
         Record::Row(Box::new(row))
     }
 

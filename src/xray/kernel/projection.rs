@@ -38,7 +38,7 @@ impl<'a> Projection<'a> {
         // speed. The bound need not be tight: each factor of two costs a bit of some 20.
         let slowest = rays.axis.norm() * 0.5 * step_mm;
         let diagonal = Vector::from(volume.dims.map(|n| n as f64)).norm();
-        let most = (diagonal / slowest).ceil().max(1.0).min(1e9) as u32;
+        let most = (diagonal / slowest).ceil().clamp(1.0, 1e9) as u32;
         let shift = (32 - most.leading_zeros()).saturating_sub(31 - 2 * WEIGHT_BITS);
         Self {
             volume,
