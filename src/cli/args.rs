@@ -1,7 +1,7 @@
 //! The arguments, and which subcommand they go to.
 
 use super::error::{Exit, Failure};
-use super::{plan, replay, report, run, status};
+use super::{plan, replay, report, run, show, status};
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -43,6 +43,8 @@ enum Command {
     Report(report::Arguments),
     /// Make one registration again and compare it with its row.
     Replay(replay::Arguments),
+    /// Draw a case, or what a registration made of it.
+    Show(show::Arguments),
 }
 
 /// Parses the command line and does what it says.
@@ -55,6 +57,7 @@ pub fn main() -> ExitCode {
         Command::Status(own) => status::main(own, common),
         Command::Report(own) => report::main(own, common),
         Command::Replay(own) => replay::main(own, common),
+        Command::Show(own) => show::main(own, common),
     };
     match result {
         Ok(exit) => exit.into(),

@@ -29,7 +29,11 @@ pub enum Failure {
     Rows(#[from] pao_sim::report::RowsError),
     #[error(transparent)]
     Report(#[from] pao_sim::report::ReportError),
-    #[error("the study has no registration {0}; `pao-sim plan` tells what it consists of")]
+    #[error(transparent)]
+    Picture(#[from] pao_sim::report::PictureError),
+    #[error("{phase}: {message}", phase = .0.phase, message = .0.message)]
+    Work(pao_sim::study::Failure),
+    #[error("the study has no registration or case {0}; `pao-sim plan` tells what it consists of")]
     NotPlanned(String),
     #[error("cannot {action}: {cause}")]
     Io {
@@ -59,5 +63,11 @@ impl Failure {
 impl From<pao_sim::study::ConfigError> for Failure {
     fn from(error: pao_sim::study::ConfigError) -> Self {
         Self::Study(error.into())
+    }
+}
+
+impl From<pao_sim::study::Failure> for Failure {
+    fn from(failure: pao_sim::study::Failure) -> Self {
+        Self::Work(failure)
     }
 }

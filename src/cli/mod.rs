@@ -3,11 +3,13 @@
 mod args;
 mod error;
 mod logging;
+mod output;
 mod plan;
 mod progress;
 mod replay;
 mod report;
 mod run;
+mod show;
 mod status;
 mod stop;
 

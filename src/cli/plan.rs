@@ -2,6 +2,7 @@
 
 use super::args::Common;
 use super::error::{Exit, Failure};
+use super::output::say;
 use super::progress::duration;
 use pao_sim::study::{Config, Plan, Snapshot, Status, StudyFolder};
 use serde_json::json;
@@ -45,24 +46,24 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             "thread_seconds": seconds,
             "megabytes": megabytes,
         });
-        println!("{plan}");
+        say!("{plan}");
         return Ok(Exit::Complete);
     }
-    println!(
+    say!(
         "study {}: {} registrations of {} cases",
         config.study.name,
         plan.len(),
         plan.cases.len()
     );
     if !config.study.reduced.is_empty() {
-        println!("REDUCED: {}", config.study.reduced);
+        say!("REDUCED: {}", config.study.reduced);
     }
     let names: Vec<String> = plan
         .specimens
         .iter()
         .map(|specimen| specimen.name())
         .collect();
-    println!(
+    say!(
         "  {} specimens ({}) x {} sides x {} fragments x {} movements x {} initializations",
         names.len(),
         names.join(", "),
@@ -71,24 +72,24 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         config.movement.movements,
         config.study.initializations
     );
-    println!(
+    say!(
         "\n  {:<24}{:<16}{:>14}",
-        "scenario", "strategy", "registrations"
+        "scenario",
+        "strategy",
+        "registrations"
     );
     for (scenario, strategy, registrations) in plan.cells() {
-        println!("  {:<24}{strategy:<16}{registrations:>14}", scenario.name());
+        say!("  {:<24}{strategy:<16}{registrations:>14}", scenario.name());
     }
-    println!();
+    say!("");
     match (seconds, status) {
-        (Some(seconds), Some(status)) => println!(
+        (Some(seconds), Some(status)) => say!(
             "cost: {} of one thread, going by the {} registrations that are there",
             duration(seconds),
             status.done
         ),
-        _ => println!(
-            "cost: not known before the first registrations; `pao-sim status` tells it then"
-        ),
+        _ => say!("cost: not known before the first registrations; `pao-sim status` tells it then"),
     }
-    println!("disk: about {megabytes:.1} MB in a few files");
+    say!("disk: about {megabytes:.1} MB in a few files");
     Ok(Exit::Complete)
 }

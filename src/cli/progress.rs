@@ -1,5 +1,6 @@
 //! Progress: a bar on a terminal, a line a minute elsewhere, JSON for machines.
 
+use super::output::say;
 use indicatif::{ProgressBar, ProgressStyle};
 use pao_sim::store::{COMPLETE, Row};
 use pao_sim::study::{Event, RegistrationKey};
@@ -65,7 +66,7 @@ impl Progress {
                 let failed = row.text("status") != COMPLETE;
                 counts.failed += usize::from(failed);
                 if self.json {
-                    println!("{}", described(row));
+                    say!("{}", described(row));
                 } else if failed {
                     let key = RegistrationKey::of_row(row);
                     let key = key.map_or_else(String::new, |key| key.to_string());

@@ -2,6 +2,7 @@
 
 use super::args::Common;
 use super::error::{Exit, Failure};
+use super::output::say;
 use pao_sim::store::{COMPLETE, FAILED, Role, Row, SCHEMA, Value};
 use pao_sim::study::{self, CaseWorker, RegistrationKey, Snapshot, StudyFolder, Worker};
 use std::path::PathBuf;
@@ -27,7 +28,7 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let before = snapshot.state.row(&key);
     let differences = before.map(|before| before.differences(&row));
     if common.json {
-        println!("{}", json(&row, differences.as_ref().map(Vec::len)));
+        say!("{}", json(&row, differences.as_ref().map(Vec::len)));
     } else {
         print(&row);
     }
@@ -72,7 +73,7 @@ fn make(worker: &CaseWorker, key: &RegistrationKey) -> Row {
 fn print(row: &Row) {
     for column in &SCHEMA.columns {
         if let Some(value) = row.get(&column.name) {
-            println!("{:<36} {}", column.name, text(&Some(value.clone())));
+            say!("{:<36} {}", column.name, text(&Some(value.clone())));
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::args::Common;
 use super::error::{Exit, Failure};
+use super::output::say;
 use pao_sim::report::{About, Group, Rows, write};
 use pao_sim::study::{Snapshot, StudyFolder};
 use std::collections::BTreeMap;
@@ -22,7 +23,7 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let folder = snapshot.folder.report();
     if common.json {
         let groups: Vec<&str> = groups.iter().map(|group| group.name.as_str()).collect();
-        println!(
+        say!(
             "{}",
             serde_json::json!({ "report": folder, "groups": groups })
         );
@@ -47,10 +48,10 @@ pub fn make(study: &Snapshot) -> Result<Vec<Group>, Failure> {
 /// Prints Table I, the shares and Table II of each group.
 pub fn print(groups: &[Group]) {
     for group in groups {
-        println!("{}\n", group.title);
+        say!("{}\n", group.title);
         for table in &group.tables {
             if ["table1", "shares", "table2"].contains(&table.name.as_str()) {
-                println!("{}", table.text());
+                say!("{}", table.text());
             }
         }
     }

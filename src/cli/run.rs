@@ -2,6 +2,7 @@
 
 use super::args::Common;
 use super::error::{Exit, Failure};
+use super::output::say;
 use super::progress::Progress;
 use super::{logging, report, stop};
 use pao_sim::study::{
@@ -91,7 +92,7 @@ fn tell(study: &Snapshot, outcome: &Outcome, common: &Common) {
         let line = serde_json::json!({
             "planned": planned, "done": done, "failed": failed, "stopped": stopped,
         });
-        println!("{line}");
+        say!("{line}");
         return;
     }
     eprintln!(

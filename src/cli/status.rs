@@ -2,6 +2,7 @@
 
 use super::args::Common;
 use super::error::{Exit, Failure};
+use super::output::say;
 use super::progress::duration;
 use pao_sim::study::{Snapshot, Status, StudyFolder};
 use std::collections::BTreeMap;
@@ -22,7 +23,7 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let status = Status::of(&Snapshot::read(folder)?);
     if common.json {
         let text = serde_json::to_string(&status);
-        println!("{}", text.expect("a status is plain data"));
+        say!("{}", text.expect("a status is plain data"));
         return Ok(exit(&status));
     }
     let doing = if status.running {
@@ -30,20 +31,28 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     } else {
         "not running"
     };
-    println!(
+    say!(
         "study {}: {} of {} registrations, {} failed; {doing}, {} attempts",
-        status.study, status.done, status.planned, status.failed, status.attempts
+        status.study,
+        status.done,
+        status.planned,
+        status.failed,
+        status.attempts
     );
     for cell in &status.cells {
-        println!(
+        say!(
             "  {:<24}{:<16}{:>8} of {:<8}{:>6} failed",
-            cell.scenario, cell.strategy, cell.done, cell.planned, cell.failed
+            cell.scenario,
+            cell.strategy,
+            cell.done,
+            cell.planned,
+            cell.failed
         );
     }
     if let (Some(rate), Some(left)) = (status.rate_per_hour, status.remaining_seconds)
         && status.done < status.planned
     {
-        println!(
+        say!(
             "{rate:.0} registrations an hour, {} to go at this rate",
             duration(left)
         );
@@ -51,11 +60,14 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if arguments.failures {
         for failure in &status.failures {
             let study = arguments.study.display();
-            println!(
+            say!(
                 "{}: {} in {}: {}",
-                failure.key, failure.status, failure.phase, failure.message
+                failure.key,
+                failure.status,
+                failure.phase,
+                failure.message
             );
-            println!("  pao-sim replay {study} {}", failure.key);
+            say!("  pao-sim replay {study} {}", failure.key);
         }
     } else if status.failed > 0 {
         let mut reasons: BTreeMap<(&str, &str), usize> = BTreeMap::new();
@@ -65,9 +77,9 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
                 .or_default() += 1;
         }
         for ((phase, message), count) in reasons {
-            println!("  {count} failed in {phase}: {message}");
+            say!("  {count} failed in {phase}: {message}");
         }
-        println!("--failures lists each with the command that repeats it");
+        say!("--failures lists each with the command that repeats it");
     }
     Ok(exit(&status))
 }

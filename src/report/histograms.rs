@@ -123,8 +123,8 @@ impl JointHistograms {
         chart
             .configure_mesh()
             .disable_mesh()
-            .x_desc("rotation (deg)")
-            .y_desc("translation (mm)")
+            .x_desc("rotation (deg), more in the last bin")
+            .y_desc("translation (mm), more in the last bin")
             .label_style(("sans-serif", 12))
             .draw()?;
         let step = (
@@ -221,7 +221,7 @@ fn draw_lce_panel<B: DrawingBackend>(
     chart
         .configure_mesh()
         .disable_mesh()
-        .x_desc("LCE error (deg)")
+        .x_desc("LCE error (deg), more in the outer bins")
         .y_desc("share")
         .label_style(("sans-serif", 12))
         .draw()?;

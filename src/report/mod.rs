@@ -6,6 +6,7 @@ pub mod errors_table;
 pub mod histograms;
 pub mod numbers;
 pub mod offsets_table;
+pub mod picture;
 pub mod reference;
 pub mod rows;
 pub mod sampling_table;
@@ -13,6 +14,7 @@ pub mod table;
 pub mod tests_table;
 pub mod write;
 
+pub use picture::{Picture, PictureError};
 pub use rows::{Rows, RowsError};
 pub use table::Table;
 pub use write::{About, Group, ReportError, write};

@@ -66,11 +66,38 @@ pub fn table2(rows: &Rows) -> Result<Table, StatisticsError> {
     })
 }
 
-/// Four digits, or a power of ten where they would all be zero.
+/// Four decimals, or two digits and a power of ten where they would all be zero. Works from the
+/// logarithm, so that a p value below the smallest number is still told.
 fn p_value(test: &MannWhitney) -> String {
-    if test.log10_p < -4.0 {
-        format!("1e{:.1}", test.log10_p)
-    } else {
-        format!("{:.4}", test.p)
+    if test.log10_p >= -3.3 {
+        return format!("{:.4}", test.p);
+    }
+    let mut exponent = test.log10_p.floor();
+    let mut digits = 10f64.powf(test.log10_p - exponent);
+    if digits >= 9.95 {
+        (digits, exponent) = (1.0, exponent + 1.0);
+    }
+    format!("{digits:.1}e{exponent}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn p_values_are_told_however_small() {
+        let text = |log10_p: f64| {
+            p_value(&MannWhitney {
+                sizes: [1, 1],
+                u: [0.0, 1.0],
+                p: 10f64.powf(log10_p),
+                log10_p,
+                exact: false,
+            })
+        };
+        assert_eq!(text(-1.0), "0.1000");
+        assert_eq!(text(-4.6), "2.5e-5");
+        assert_eq!(text(-6.999), "1.0e-7");
+        assert_eq!(text(-5_000.3), "5.0e-5001");
     }
 }

@@ -232,3 +232,68 @@ fn failed(path: &Path) -> impl FnOnce(std::io::Error) -> ReportError {
     let path = path.to_owned();
     move |cause| ReportError::Write { path, cause }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::errors_table::SCENARIOS;
+    use super::*;
+    use crate::store::{Kind, SCHEMA};
+
+    /// 48 made-up registrations of six cases and four scenarios, one of them failed, with every
+    /// column of the schema.
+    fn rows() -> Rows {
+        let n = 48;
+        let (mut text, mut numbers) = (BTreeMap::new(), BTreeMap::new());
+        for (place, column) in SCHEMA.columns.iter().enumerate() {
+            let name = column.name.clone();
+            if column.kind == Kind::Text {
+                let value = |i: usize| match name.as_str() {
+                    "specimen" => "phantom-1".to_owned(),
+                    "specimen_kind" => "phantom".to_owned(),
+                    "side" => "left".to_owned(),
+                    "strategy" => "paper".to_owned(),
+                    "scenario" => SCENARIOS[i % 4].to_owned(),
+                    "status" if i == 5 => "failed".to_owned(),
+                    "status" => COMPLETE.to_owned(),
+                    "phase" if i == 5 => "view2_search".to_owned(),
+                    "message" if i == 5 => "no candidate | is finite".to_owned(),
+                    "pubis_fallback" if i == 3 => "too few points".to_owned(),
+                    _ => String::new(),
+                };
+                text.insert(name.clone(), (0..n).map(value).collect());
+            } else {
+                let value = |i: usize| match name.as_str() {
+                    "fragment" => 0.0,
+                    "movement" => (i / 8) as f64,
+                    "initialization" => (i / 4 % 2) as f64,
+                    "true_rotation_deg" => 10.0 + (i / 8) as f64,
+                    name if name.ends_with("_capped") => 0.0,
+                    _ => ((i * (place + 7)) as f64 * 0.618).fract() * (1.0 + (i % 4) as f64),
+                };
+                numbers.insert(name.clone(), (0..n).map(value).collect());
+            }
+        }
+        Rows::of(text, numbers)
+    }
+
+    #[test]
+    fn a_report_of_made_up_rows() {
+        let about = About {
+            study: "made-up".into(),
+            description: "48 registrations that nobody made".into(),
+            reduced: String::new(),
+            seed: 7,
+            planned: BTreeMap::from([(("phantom-1".into(), "paper".into()), 96)]),
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let groups = write(&rows(), &about, folder.path()).unwrap();
+        assert_eq!(groups.len(), 1);
+        let page = std::fs::read_to_string(folder.path().join("report.md")).unwrap();
+        insta::assert_snapshot!(page);
+        let tests = Rows::read(&folder.path().join("tests.parquet")).unwrap();
+        assert_eq!(tests.len(), 15);
+        let summaries = Rows::read(&folder.path().join("summaries.parquet")).unwrap();
+        assert_eq!(summaries.len(), 36);
+        assert_eq!(summaries.numbers("paper_mean")[3], 1.25);
+    }
+}

@@ -5,9 +5,9 @@ use super::record;
 use super::{CaseKey, Config, Failure, RegistrationKey, Scenario, StrategyParameters, Worker};
 use crate::random::{Purpose, stream};
 use crate::registration::paper::Paper;
-use crate::registration::{Shape, Strategy};
+use crate::registration::{Outcome, Shape, Strategy};
 use crate::simulation::case::{Case, CaseParameters};
-use crate::simulation::sample_movement;
+use crate::simulation::{Pick, sample_movement};
 use crate::store::Row;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -52,6 +52,36 @@ impl CaseWorker {
             },
             config,
         }
+    }
+
+    /// The noisy pick of a registration's initialization.
+    pub fn pick(&self, case: &SimulatedCase, key: &RegistrationKey) -> Pick {
+        let parameters = &self.config.xray.pick;
+        case.case.pick(parameters, &key.initialization_key())
+    }
+
+    /// What the registration's strategy makes of the case.
+    ///
+    /// # Errors
+    /// When the scenario's models cannot be made or the strategy comes to no result.
+    pub fn estimate(
+        &self,
+        case: &SimulatedCase,
+        key: &RegistrationKey,
+        pick: &Pick,
+    ) -> Result<Outcome, Failure> {
+        let shape = self.shape(case, key.scenario)?;
+        let name = key.initialization_key();
+        let observation = case.case.observation(pick, shape, name);
+        let strategy = self.strategies.get(&key.strategy).ok_or_else(|| {
+            Failure::new(
+                "strategy",
+                format!("the study has no strategy {}", key.strategy),
+            )
+        })?;
+        strategy
+            .register(&observation)
+            .map_err(|error| Failure::new(error.phase, error.cause))
     }
 
     /// What a scenario gives a registration to know of the fragment's shape.
@@ -115,20 +145,9 @@ impl Worker for CaseWorker {
     ) -> Result<(), Failure> {
         let apex = self.config.movement.lce_apex;
         record::truth(case, apex, row)?;
-        let name = key.initialization_key();
-        let pick = case.case.pick(&self.config.xray.pick, &name);
+        let pick = self.pick(case, key);
         record::pick(case, &pick, row);
-        let shape = self.shape(case, key.scenario)?;
-        let observation = case.case.observation(&pick, shape, name);
-        let strategy = self.strategies.get(&key.strategy).ok_or_else(|| {
-            Failure::new(
-                "strategy",
-                format!("the study has no strategy {}", key.strategy),
-            )
-        })?;
-        let outcome = strategy
-            .register(&observation)
-            .map_err(|error| Failure::new(error.phase, error.cause))?;
+        let outcome = self.estimate(case, key, &pick)?;
         record::outcome(case, key.scenario, &outcome, apex, row)
     }
 }

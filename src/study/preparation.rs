@@ -172,7 +172,11 @@ impl PreparedHip {
         self.full_pelvis.get_or_init(make).clone()
     }
 
-    fn models(&self, cuts: &CutPlanes) -> Result<BoneModels, Failure> {
+    /// The bone models of given cuts.
+    ///
+    /// # Errors
+    /// When these cuts free no fragment.
+    pub fn models(&self, cuts: &CutPlanes) -> Result<BoneModels, Failure> {
         let femur = self.femur()?;
         let models = self.recipe.models(&self.hip, &femur, cuts);
         models.map_err(model_failure)
