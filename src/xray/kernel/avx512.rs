@@ -1,11 +1,64 @@
 //! Tiles of 4 x 4 rays in the lanes of AVX-512, one sample of each ray at a time.
+//!
+//! A tile is done in two passes. The first finds the samples that can meet something and where in
+//! memory their voxels are, and asks for them; the second interpolates. Between the two passes of
+//! a tile comes the second pass of the tile before, so that voxels arrive from the outer caches in
+//! the meantime.
 
 use super::Projection;
-use super::fixed::{BITS, CHUNK, TILE, WEIGHT_BITS, WEIGHT_ONE};
+use super::fixed::{BITS, CHUNK, TILE, TileRays, WEIGHT_BITS, WEIGHT_ONE};
 use super::occupancy::Occupancy;
 use std::arch::x86_64::*;
+use std::cell::RefCell;
 
-/// The three indices of 16 positions.
+/// Adds the line integrals of a projection's pixels to `out`: see `portable::project_add`, of
+/// which this gives the same bits.
+#[target_feature(enable = "avx2,avx512f,avx512bw,avx512dq,avx512vl")]
+pub(crate) fn project_add(job: &Projection, out: &mut [f32]) {
+    TILES.with_borrow_mut(|[next, current]| {
+        let rect = &job.rect;
+        let call = Call::new(job);
+        current.runs.clear();
+        for v in (rect.y0 - rect.y0 % TILE..rect.y1).step_by(TILE) {
+            for u in (rect.x0 - rect.x0 % TILE..rect.x1).step_by(TILE) {
+                call.find_samples(u, v, next);
+                if next.runs.is_empty() {
+                    continue;
+                }
+                call.add_tile(current, out);
+                std::mem::swap(next, current);
+            }
+        }
+        call.add_tile(current, out);
+    });
+}
+
+thread_local! {
+    /// The tile between its passes and the one before it, kept from call to call for the sake of
+    /// their memory.
+    static TILES: RefCell<[Tile; 2]> = RefCell::default();
+}
+
+/// What the first pass over a tile finds.
+#[derive(Default)]
+struct Tile {
+    /// The first pixel.
+    u: usize,
+    v: usize,
+    rays: TileRays,
+    runs: Vec<Run>,
+    /// The voxels of all samples of all runs. More than that may be stored.
+    places: Vec<[u32; 16]>,
+}
+
+/// Consecutive samples of a chunk.
+struct Run {
+    chunk: u32,
+    first: u32,
+    count: u32,
+}
+
+/// Indices of 16 positions in fixed point.
 #[derive(Clone, Copy)]
 struct Positions {
     i: __m512i,
@@ -13,142 +66,279 @@ struct Positions {
     k: __m512i,
 }
 
-/// Adds the line integrals of a projection's pixels to `out`: see `portable::project_add`, of
-/// which this gives the same bits.
-#[target_feature(enable = "avx2,avx512f,avx512bw,avx512dq,avx512vl")]
-pub(crate) fn project_add(job: &Projection, out: &mut [f32]) {
-    let rect = &job.rect;
-    let across = Across::new(job);
-    for v in (rect.y0 - rect.y0 % TILE..rect.y1).step_by(TILE) {
-        for u in (rect.x0 - rect.x0 % TILE..rect.x1).step_by(TILE) {
-            let sums = tile_sums(job, &across, u, v);
-            for (lane, &sum) in sums.iter().enumerate() {
-                let (x, y) = (u + lane % TILE, v + lane / TILE);
-                let inside = (rect.x0..rect.x1).contains(&x) && (rect.y0..rect.y1).contains(&y);
-                if sum != 0 && inside {
-                    out[y * job.width + x] += sum as f32 * job.scale(x, y);
-                }
-            }
-        }
-    }
-}
-
-/// What is the same for all tiles.
-struct Across {
+/// One projection with what is the same for all of its tiles.
+struct Call<'a> {
+    job: &'a Projection<'a>,
     /// Column and row of each lane in its tile.
     column: __m512i,
     row: __m512i,
-    /// Number of each lane.
-    number: __m512i,
-    /// The last index along each axis, in fixed point.
+    /// The last index along each axis.
     last: Positions,
     /// Voxels of a row and of a slice.
     row_voxels: __m512i,
     slice_voxels: __m512i,
-    /// The last cell along each axis, and cells of a row and rows of a slice.
-    last_cell: Positions,
-    cells: [__m512i; 2],
-    /// Cells up to this distance from the tile's centre can hold what one of its rays meets.
-    reach: u8,
-    /// The volume's box is this many voxels wider for the tile's centre.
-    margin: f64,
+    /// The rays of a tile lie at most this many voxels from its centre, per mm of depth, and
+    /// anywhere in the volume.
+    radius_per_mm: f64,
+    radius: f64,
     step_offsets: ([i32; 3], [i32; 3]),
+    prefetch: Prefetch,
 }
 
-impl Across {
+/// More voxels than positions in fixed point can be off.
+const ROUNDING: f64 = 0.01;
+
+/// Which voxels are asked for ahead of time: a few lanes whose cache lines hold most of what all
+/// of them need.
+struct Prefetch {
+    /// Every this many samples of a run.
+    every: u32,
+    lanes: [u8; 8],
+    /// Lanes for which the upper slice is asked for too.
+    upper: [u8; 2],
+}
+
+impl<'a> Call<'a> {
     #[target_feature(enable = "avx2,avx512f,avx512bw,avx512dq,avx512vl")]
-    fn new(job: &Projection) -> Self {
-        let set = |v: [i32; 3]| Positions {
-            i: _mm512_set1_epi32(v[0]),
-            j: _mm512_set1_epi32(v[1]),
-            k: _mm512_set1_epi32(v[2]),
-        };
+    fn new(job: &'a Projection<'a>) -> Self {
         let [nx, ny, _] = job.volume.dims;
-        let cells = job.volume.occupancy.dims;
         let half = (TILE as f64 - 1.0) / 2.0;
-        let radius =
-            (job.rays.column.abs() + job.rays.row.abs()).max() * half * job.farthest_mm + 0.01;
+        let radius_per_mm = (job.rays.column.abs() + job.rays.row.abs()).max() * half;
         Self {
+            job,
             column: _mm512_setr_epi32(0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3),
             row: _mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3),
-            number: _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15),
-            last: set(job.last),
+            last: all(job.last),
             row_voxels: _mm512_set1_epi32(nx as i32),
             slice_voxels: _mm512_set1_epi32((nx * ny) as i32),
-            last_cell: set(cells.map(|n| n as i32 - 1)),
-            cells: [
-                _mm512_set1_epi32(cells[0] as i32),
-                _mm512_set1_epi32(cells[1] as i32),
-            ],
-            reach: (radius / Occupancy::EDGE as f64).ceil().min(255.0) as u8,
-            margin: radius,
+            radius_per_mm,
+            radius: radius_per_mm * job.farthest_mm + ROUNDING,
             step_offsets: job.fixed.step_offsets(),
+            prefetch: Prefetch::new(job),
         }
+    }
+
+    /// First pass: fills `tile` with the samples that can meet something.
+    #[target_feature(enable = "avx2,avx512f,avx512bw,avx512dq,avx512vl")]
+    fn find_samples(&self, u: usize, v: usize, tile: &mut Tile) {
+        let job = self.job;
+        tile.runs.clear();
+        let half = (TILE as f64 - 1.0) / 2.0;
+        let slope =
+            job.rays.axis + job.rays.column * (u as f64 + half) + job.rays.row * (v as f64 + half);
+        let Some((first, end)) = job.samples(slope, self.radius) else {
+            return;
+        };
+        (tile.u, tile.v) = (u, v);
+        tile.rays = job.fixed.tile(u, v);
+        let step = self.step(&tile.rays);
+        let (column, row) = self.step_offsets;
+        let center_step = center(tile.rays.step(), column, row);
+        let fastest = center_step.iter().map(|s| s.unsigned_abs()).max();
+        let chunks_per_voxel = (1u32 << BITS) as f32 / (fastest.unwrap_or(1) * CHUNK) as f32;
+        let mut count = 0;
+        let mut chunk = first / CHUNK;
+        while chunk * CHUNK < end {
+            let (column, row) = job.fixed.offsets(chunk);
+            let start = tile.rays.start(chunk);
+            let clearances = clearances(job, center(start, column, row), center_step);
+            // A ray may meet something where it is farther from the centre than the centre's cell
+            // can grow less one voxel.
+            let depth = f64::from((chunk + 1) * CHUNK) * job.step_mm;
+            let radius = (self.radius_per_mm * depth + ROUNDING).min(self.radius);
+            let mut mask = u32::from(_mm512_cmple_epu32_mask(
+                clearances,
+                _mm512_set1_epi32(radius.ceil() as i32),
+            ));
+            mask &= samples_from(first.saturating_sub(chunk * CHUNK))
+                & !samples_from(end - chunk * CHUNK);
+            if mask == 0 {
+                // The last sample's clearance tells how many more are far from everything.
+                let last = _mm_extract_epi32::<3>(_mm512_extracti32x4_epi32::<3>(clearances));
+                let free = last as f32 - 1.0 - radius as f32;
+                chunk += 1 + (free.max(0.0) * chunks_per_voxel) as u32;
+                continue;
+            }
+            let start = self.lanes(start, column, row);
+            if tile.places.len() < count + CHUNK as usize {
+                tile.places.resize(2 * count + CHUNK as usize, [0; 16]);
+            }
+            while mask != 0 {
+                let first = mask.trailing_zeros();
+                let run = (mask >> first).trailing_ones();
+                mask &= samples_from(first + run);
+                tile.runs.push(Run {
+                    chunk,
+                    first,
+                    count: run,
+                });
+                let mut at = ahead(start, step, first);
+                for (n, places) in (0..run).zip(&mut tile.places[count..]) {
+                    let voxels = self.voxels(at);
+                    // SAFETY: the array has the 64 bytes that are stored.
+                    unsafe { _mm512_storeu_si512(places.as_mut_ptr().cast(), voxels) };
+                    if n % self.prefetch.every == 0 {
+                        self.prefetch.ask(job, places);
+                    }
+                    at = sum(at, step);
+                }
+                count += run as usize;
+            }
+            chunk += 1;
+        }
+    }
+
+    /// Second pass: adds the line integrals of a tile's pixels to `out`.
+    #[target_feature(enable = "avx2,avx512f,avx512bw,avx512dq,avx512vl")]
+    fn add_tile(&self, tile: &Tile, out: &mut [f32]) {
+        if tile.runs.is_empty() {
+            return;
+        }
+        let job = self.job;
+        let step = self.step(&tile.rays);
+        let shift = _mm_cvtsi32_si128(job.shift as i32);
+        let mut sums = _mm512_setzero_si512();
+        let mut places = tile.places.iter();
+        for run in &tile.runs {
+            let (column, row) = job.fixed.offsets(run.chunk);
+            let start = self.lanes(tile.rays.start(run.chunk), column, row);
+            let mut at = ahead(start, step, run.first);
+            for (_, places) in (0..run.count).zip(&mut places) {
+                let negative = negative_samples(job, places, at);
+                sums = _mm512_sub_epi32(sums, _mm512_sra_epi32(negative, shift));
+                at = sum(at, step);
+            }
+        }
+        let mut lanes = [0; 16];
+        // SAFETY: the array has the 64 bytes that are stored.
+        unsafe { _mm512_storeu_si512(lanes.as_mut_ptr().cast(), sums) };
+        job.add_tile_sums(tile.u, tile.v, &lanes, out);
+    }
+
+    /// What each lane's ray moves on from sample to sample.
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    fn step(&self, rays: &TileRays) -> Positions {
+        let (column, row) = self.step_offsets;
+        self.lanes(rays.step(), column, row)
+    }
+
+    /// Values of all lanes from that of the first and what columns and rows add.
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    fn lanes(&self, first: [i32; 3], column: [i32; 3], row: [i32; 3]) -> Positions {
+        let one = |a: usize| {
+            let columns = _mm512_mullo_epi32(self.column, _mm512_set1_epi32(column[a]));
+            let rows = _mm512_mullo_epi32(self.row, _mm512_set1_epi32(row[a]));
+            _mm512_add_epi32(_mm512_set1_epi32(first[a]), _mm512_add_epi32(columns, rows))
+        };
+        Positions {
+            i: one(0),
+            j: one(1),
+            k: one(2),
+        }
+    }
+
+    /// The numbers of the lower corners of 16 positions. Those outside the volume get a corner
+    /// whose neighbours are all zero: read as numbers without sign, negative ones are large.
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    fn voxels(&self, at: Positions) -> __m512i {
+        let voxel = |p, last| _mm512_srli_epi32::<BITS>(_mm512_min_epu32(p, last));
+        _mm512_add_epi32(
+            voxel(at.i, self.last.i),
+            _mm512_add_epi32(
+                _mm512_mullo_epi32(voxel(at.j, self.last.j), self.row_voxels),
+                _mm512_mullo_epi32(voxel(at.k, self.last.k), self.slice_voxels),
+            ),
+        )
+    }
+}
+
+impl Prefetch {
+    fn new(job: &Projection) -> Self {
+        let (column, row) = (&job.rays.column, &job.rays.row);
+        let along_rays = job.rays.axis.iamax() == 0;
+        // Lanes side by side along the voxels' rows share cache lines.
+        let lanes = if column.x.abs() >= row.x.abs() {
+            [0, 3, 4, 7, 8, 11, 12, 15]
+        } else {
+            [0, 1, 2, 3, 12, 13, 14, 15]
+        };
+        // The lanes on the uppermost slice of the tile.
+        let upper = if column.z.abs() >= row.z.abs() {
+            if column.z > 0.0 { [3, 15] } else { [0, 12] }
+        } else if row.z > 0.0 {
+            [12, 15]
+        } else {
+            [0, 3]
+        };
+        Self {
+            // Along the voxels' rows one cache line serves a dozen samples.
+            every: if along_rays { 8 } else { 1 },
+            lanes,
+            upper,
+        }
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    fn ask(&self, job: &Projection, places: &[u32; 16]) {
+        let pairs = job.volume.pairs.as_ptr();
+        for lane in self.lanes {
+            let at = places[usize::from(lane) % 16] as usize;
+            _mm_prefetch::<_MM_HINT_T0>(pairs.wrapping_add(at).cast());
+        }
+        let slice = pairs.wrapping_add(job.volume.dims[0] * job.volume.dims[1]);
+        for lane in self.upper {
+            let at = places[usize::from(lane) % 16] as usize;
+            _mm_prefetch::<_MM_HINT_T0>(slice.wrapping_add(at).cast());
+        }
+    }
+}
+
+/// The same in all lanes.
+#[inline]
+#[target_feature(enable = "avx512f")]
+fn all(index: [i32; 3]) -> Positions {
+    Positions {
+        i: _mm512_set1_epi32(index[0]),
+        j: _mm512_set1_epi32(index[1]),
+        k: _mm512_set1_epi32(index[2]),
     }
 }
 
 #[inline]
-#[target_feature(enable = "avx2,avx512f,avx512bw,avx512dq,avx512vl")]
-fn tile_sums(job: &Projection, across: &Across, u: usize, v: usize) -> [i32; 16] {
-    let half = (TILE as f64 - 1.0) / 2.0;
-    let slope =
-        job.rays.axis + job.rays.column * (u as f64 + half) + job.rays.row * (v as f64 + half);
-    let Some((first, end)) = job.samples(slope, across.margin) else {
-        return [0; 16];
-    };
-    let tile = job.fixed.tile(u, v);
-    let (column, row) = across.step_offsets;
-    let step = in_tile(across, tile.step(), column, row);
-    let center = |at: [i32; 3], column: [i32; 3], row: [i32; 3]| -> [i32; 3] {
-        std::array::from_fn(|a| {
-            at[a].wrapping_add(column[a].wrapping_add(row[a]).wrapping_mul(TILE as i32 - 1) / 2)
-        })
-    };
-    let center_step = center(tile.step(), column, row);
-    let fastest = center_step
-        .iter()
-        .map(|s| s.unsigned_abs())
-        .max()
-        .unwrap_or(1);
-    let chunks_per_cell = (Occupancy::EDGE << BITS) as f32 / fastest as f32 / CHUNK as f32;
-    let mut sums = _mm512_setzero_si512();
-    let shift = _mm_cvtsi32_si128(job.shift as i32);
-    let mut chunk = first / CHUNK;
-    while chunk * CHUNK < end {
-        let (column, row) = job.fixed.offsets(chunk);
-        let start = tile.start(chunk);
-        let distances = chunk_distances(job, across, center(start, column, row), center_step);
-        let mut mask = u32::from(_mm512_cmple_epu32_mask(
-            distances,
-            _mm512_set1_epi32(i32::from(across.reach)),
-        ));
-        mask &=
-            samples_from(first.saturating_sub(chunk * CHUNK)) & !samples_from(end - chunk * CHUNK);
-        if mask == 0 {
-            // The last sample's distance tells how many further ones are far from everything.
-            let distance = _mm_extract_epi32::<3>(_mm512_extracti32x4_epi32::<3>(distances));
-            let cells = distance - i32::from(across.reach) - 1;
-            chunk += 1 + (cells.max(0) as f32 * chunks_per_cell) as u32;
-            continue;
-        }
-        let start = in_tile(across, start, column, row);
-        while mask != 0 {
-            let k = _mm512_set1_epi32(mask.trailing_zeros() as i32);
-            mask &= mask - 1;
-            let at = Positions {
-                i: _mm512_add_epi32(start.i, _mm512_mullo_epi32(step.i, k)),
-                j: _mm512_add_epi32(start.j, _mm512_mullo_epi32(step.j, k)),
-                k: _mm512_add_epi32(start.k, _mm512_mullo_epi32(step.k, k)),
-            };
-            let negative = negative_samples(job, across, at);
-            sums = _mm512_sub_epi32(sums, _mm512_sra_epi32(negative, shift));
-        }
-        chunk += 1;
+#[target_feature(enable = "avx512f")]
+fn sum(a: Positions, b: Positions) -> Positions {
+    Positions {
+        i: _mm512_add_epi32(a.i, b.i),
+        j: _mm512_add_epi32(a.j, b.j),
+        k: _mm512_add_epi32(a.k, b.k),
     }
-    let mut result = [0; 16];
-    // SAFETY: the array has the 64 bytes that are stored.
-    unsafe { _mm512_storeu_si512(result.as_mut_ptr().cast(), sums) };
-    result
+}
+
+/// `start + count * step`.
+#[inline]
+#[target_feature(enable = "avx512f")]
+fn ahead(start: Positions, step: Positions, count: u32) -> Positions {
+    let count = _mm512_set1_epi32(count as i32);
+    let times = |step| _mm512_mullo_epi32(step, count);
+    let steps = Positions {
+        i: times(step.i),
+        j: times(step.j),
+        k: times(step.k),
+    };
+    sum(start, steps)
+}
+
+/// The value at a tile's centre, of which no lane has a ray.
+#[inline(always)]
+fn center(first: [i32; 3], column: [i32; 3], row: [i32; 3]) -> [i32; 3] {
+    std::array::from_fn(|a| {
+        let diagonal = column[a].wrapping_add(row[a]);
+        first[a].wrapping_add(diagonal.wrapping_mul(TILE as i32 - 1) / 2)
+    })
 }
 
 /// A mask of the samples of a chunk from number `first` on.
@@ -161,93 +351,65 @@ fn samples_from(first: u32) -> u32 {
     }
 }
 
-/// A value of each lane's ray from that of the tile's first and what columns and rows add.
-#[inline]
-#[target_feature(enable = "avx512f")]
-fn in_tile(across: &Across, at: [i32; 3], column: [i32; 3], row: [i32; 3]) -> Positions {
-    let one = |a: usize| {
-        let columns = _mm512_mullo_epi32(across.column, _mm512_set1_epi32(column[a]));
-        let rows = _mm512_mullo_epi32(across.row, _mm512_set1_epi32(row[a]));
-        _mm512_add_epi32(_mm512_set1_epi32(at[a]), _mm512_add_epi32(columns, rows))
-    };
-    Positions {
-        i: one(0),
-        j: one(1),
-        k: one(2),
-    }
-}
-
-/// How far the cells of a chunk's 16 samples lie from one that holds something, on the ray that
-/// begins at `start`.
+/// The clearances of the cells of a chunk's 16 samples, on the ray that begins at `start`.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
-fn chunk_distances(job: &Projection, across: &Across, start: [i32; 3], step: [i32; 3]) -> __m512i {
-    const SHIFT: u32 = BITS + Occupancy::SHIFT as u32;
-    let cell = |a: usize, last: __m512i| {
-        let along = _mm512_mullo_epi32(across.number, _mm512_set1_epi32(step[a]));
+fn clearances(job: &Projection, start: [i32; 3], step: [i32; 3]) -> __m512i {
+    const SHIFT: u32 = BITS + Occupancy::SHIFT;
+    let number = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    let cells = job.volume.occupancy.dims;
+    let cell = |a: usize| {
+        let along = _mm512_mullo_epi32(number, _mm512_set1_epi32(step[a]));
         let position = _mm512_add_epi32(_mm512_set1_epi32(start[a]), along);
         let cell = _mm512_srai_epi32::<SHIFT>(position);
+        let last = _mm512_set1_epi32(cells[a] as i32 - 1);
         _mm512_max_epi32(_mm512_min_epi32(cell, last), _mm512_setzero_si512())
     };
-    let (i, j, k) = (
-        cell(0, across.last_cell.i),
-        cell(1, across.last_cell.j),
-        cell(2, across.last_cell.k),
-    );
-    let rows = _mm512_add_epi32(_mm512_mullo_epi32(k, across.cells[1]), j);
-    let at = _mm512_add_epi32(_mm512_mullo_epi32(rows, across.cells[0]), i);
+    let times = |v, by: usize| _mm512_mullo_epi32(v, _mm512_set1_epi32(by as i32));
+    let row = _mm512_add_epi32(times(cell(2), cells[1]), cell(1));
+    let at = _mm512_add_epi32(times(row, cells[0]), cell(0));
     let table = job.volume.occupancy.padded();
-    // SAFETY: each index lies within the table, which has three bytes more than its cells for the
-    // four that are loaded from each.
+    // SAFETY: each number is that of a cell of the table, which has three bytes more than its
+    // cells for the four that are loaded from each.
     let loaded = unsafe { _mm512_i32gather_epi32::<1>(at, table.as_ptr().cast()) };
     _mm512_and_si512(loaded, _mm512_set1_epi32(0xff))
 }
 
-/// The interpolated volume at 16 positions, in units of the voxels over [`WEIGHT_ONE`], negative.
+/// The interpolated volume at 16 positions, whose voxels are at `places`, in units of the voxels
+/// over [`WEIGHT_ONE`], negative.
 #[inline]
 #[target_feature(enable = "avx2,avx512f,avx512bw,avx512dq,avx512vl")]
-fn negative_samples(job: &Projection, across: &Across, at: Positions) -> __m512i {
-    let clamp = |p, last| _mm512_max_epi32(_mm512_min_epi32(p, last), _mm512_setzero_si512());
-    let (i, j, k) = (
-        clamp(at.i, across.last.i),
-        clamp(at.j, across.last.j),
-        clamp(at.k, across.last.k),
-    );
-    let voxel = _mm512_add_epi32(
-        _mm512_srli_epi32::<BITS>(i),
-        _mm512_add_epi32(
-            _mm512_mullo_epi32(_mm512_srli_epi32::<BITS>(j), across.row_voxels),
-            _mm512_mullo_epi32(_mm512_srli_epi32::<BITS>(k), across.slice_voxels),
-        ),
-    );
-    let mut at = [0u32; 16];
-    // SAFETY: the array has the 64 bytes that are stored.
-    unsafe { _mm512_storeu_si512(at.as_mut_ptr().cast(), voxel) };
+fn negative_samples(job: &Projection, places: &[u32; 16], at: Positions) -> __m512i {
     let pairs = job.volume.pairs.as_ptr();
     let slice = job.volume.dims[0] * job.volume.dims[1];
-    // SAFETY: positions are clamped to the volume, and `pairs` has the slice and the two pairs
-    // beyond its last voxel that samples there read.
-    let (low, high) = unsafe { (corners(pairs, &at), corners(pairs.add(slice), &at)) };
+    // SAFETY: places are those of voxels, and `pairs` has the slice and the two pairs beyond its
+    // last voxel that samples there read.
+    let (low, high) = unsafe { (corners(pairs, places), corners(pairs.add(slice), places)) };
     const CUT: u32 = BITS - WEIGHT_BITS;
-    let part = _mm512_set1_epi32(WEIGHT_ONE - 1);
-    let weight = |p| _mm512_and_si512(_mm512_srli_epi32::<CUT>(p), part);
-    let twice = |w| _mm512_or_si512(w, _mm512_slli_epi32::<16>(w));
+    const PART: i32 = WEIGHT_ONE - 1;
+    // A weight in both halves of a lane.
+    let low_half = _mm512_broadcast_i32x4(_mm_setr_epi8(
+        0, 1, 0, 1, 4, 5, 4, 5, 8, 9, 8, 9, 12, 13, 12, 13,
+    ));
+    let twice = |p| {
+        let both = _mm512_shuffle_epi8(_mm512_srli_epi32::<CUT>(p), low_half);
+        _mm512_and_si512(both, _mm512_set1_epi32(PART | PART << 16))
+    };
     let between = |low, high, weight| {
         _mm512_add_epi16(
             low,
             _mm512_mulhrs_epi16(_mm512_sub_epi16(high, low), weight),
         )
     };
-    let along_i = twice(weight(i));
+    let along_i = twice(at.i);
     let lower = between(low[0], low[1], along_i);
     let upper = between(high[0], high[1], along_i);
-    let pair = between(lower, upper, twice(weight(k)));
-    // The weight of the lower neighbour along j can be 2^15, which only its negative can stand
-    // for in 16 bits: w - 2^15 is w with the sign bit set.
-    let w = weight(j);
+    let pair = between(lower, upper, twice(at.k));
+    // The weights along j are w - 2^15, which is w with the sign bit set, and -w: the lower
+    // neighbour's own weight can be 2^15, which 16 bits hold only as a negative.
+    let w = _mm512_and_si512(_mm512_srli_epi32::<CUT>(at.j), _mm512_set1_epi32(PART));
     let lower = _mm512_or_si512(w, _mm512_set1_epi32(WEIGHT_ONE));
-    let upper = _mm512_slli_epi32::<16>(_mm512_sub_epi32(_mm512_setzero_si512(), w));
-    _mm512_madd_epi16(pair, _mm512_or_si512(lower, upper))
+    _mm512_madd_epi16(pair, _mm512_sub_epi32(lower, _mm512_slli_epi32::<16>(w)))
 }
 
 /// The pairs at 16 places and those one voxel further.
@@ -257,8 +419,8 @@ fn negative_samples(job: &Projection, across: &Across, at: Positions) -> __m512i
 #[inline]
 #[target_feature(enable = "avx2,avx512f,avx512bw,avx512dq,avx512vl")]
 unsafe fn corners(pairs: *const [i16; 2], at: &[u32; 16]) -> [__m512i; 2] {
-    // Two places to each quarter of a register, one load each: on most processors faster than the
-    // gather instruction, and one load gives both pairs.
+    // Two places to each quarter of a register, one load each: faster than the gather
+    // instruction, and one load gives both pairs.
     let two = |n: usize| {
         // SAFETY: as this function's.
         unsafe {

@@ -39,7 +39,7 @@ pub(crate) struct FixedRays {
 }
 
 /// The rays of one tile of pixels.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct TileRays {
     source: [i64; 3],
     /// Index per chunk along the ray of the tile's first pixel.

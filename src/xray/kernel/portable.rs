@@ -9,9 +9,7 @@ pub(crate) fn project_add(job: &Projection, out: &mut [f32]) {
     for v in job.rect.y0..job.rect.y1 {
         for u in job.rect.x0..job.rect.x1 {
             let sum = ray_sum(job, u, v);
-            if sum != 0 {
-                out[v * job.width + u] += sum as f32 * job.scale(u, v);
-            }
+            out[v * job.width + u] += sum as f32 * job.scale(u, v);
         }
     }
 }
@@ -30,7 +28,7 @@ fn ray_sum(job: &Projection, u: usize, v: usize) -> i32 {
         step[a] += i * column[a] + j * row[a];
     }
     let fastest = step.iter().map(|s| s.unsigned_abs()).max().unwrap_or(1);
-    let samples_per_cell = (Occupancy::EDGE << BITS) as f32 / fastest as f32;
+    let samples_per_voxel = (1u32 << BITS) as f32 / fastest as f32;
     let mut sum = 0;
     let (mut chunk, mut start) = (u32::MAX, [0; 3]);
     let mut k = first;
@@ -51,11 +49,10 @@ fn ray_sum(job: &Projection, u: usize, v: usize) -> i32 {
                 .clamp(0, job.last[a])
         });
         let cell = position.map(|p| (p >> BITS) as usize >> Occupancy::SHIFT);
-        let distance = volume.occupancy.at(cell);
-        if distance > 0 {
-            // All cells nearer than `distance` are empty: so far the ray may go from anywhere in
-            // this cell, and at least one sample.
-            k += ((f32::from(distance) - 1.0) * samples_per_cell) as u32 + 1;
+        let clearance = volume.occupancy.clearance(cell);
+        if clearance > 0 {
+            // The ray may leave this cell by one voxel less, from anywhere in it.
+            k += ((f32::from(clearance) - 1.0) * samples_per_voxel) as u32 + 1;
             continue;
         }
         // Negative samples, because that is what fits the vector kernels' instructions.

@@ -1,7 +1,7 @@
 //! What the kernels of all levels work on.
 
 use super::KernelVolume;
-use super::fixed::{BITS, FixedRays, WEIGHT_BITS, WEIGHT_ONE};
+use super::fixed::{BITS, FixedRays, TILE, WEIGHT_BITS, WEIGHT_ONE};
 use crate::geometry::Vector;
 use crate::image::PixelRect;
 use crate::simd::SimdLevel;
@@ -58,6 +58,19 @@ impl<'a> Projection<'a> {
     #[inline(always)]
     pub fn scale(&self, u: usize, v: usize) -> f32 {
         self.unit * self.rays.length_per_depth(u, v) as f32
+    }
+
+    /// Adds the sums of the rays of a tile, row after row, to those of its pixels that lie in
+    /// `rect`.
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    pub fn add_tile_sums(&self, u: usize, v: usize, sums: &[i32; TILE * TILE], out: &mut [f32]) {
+        for y in v.max(self.rect.y0)..(v + TILE).min(self.rect.y1) {
+            for x in u.max(self.rect.x0)..(u + TILE).min(self.rect.x1) {
+                let sum = sums[(y - v) * TILE + x - u];
+                out[y * self.width + x] += sum as f32 * self.scale(x, y);
+            }
+        }
     }
 
     /// The samples `first..end` of the ray with this slope that lie in the volume's box widened by
