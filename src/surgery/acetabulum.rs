@@ -120,3 +120,54 @@ fn sphere(n: usize) -> impl Iterator<Item = Vector> {
         Vector::new(radius * cos, y, radius * sin)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::anatomy::Side;
+    use crate::surgery::block_hip::{SHELL_END_MM, SHELL_MM, VOXEL_MM, block_hip};
+
+    #[test]
+    fn rays_find_the_inside_of_the_shell_on_both_sides() {
+        for side in Side::BOTH {
+            let hip = block_hip(side);
+            let acetabulum = Acetabulum::of(&hip).unwrap();
+            assert_eq!(acetabulum.rim.len(), 72);
+            for p in &acetabulum.surface {
+                let r = p.coords.norm();
+                // The nearest voxel's centre may lie half a diagonal off, a ray half a step late.
+                assert!((r - SHELL_MM[0]).abs() < 0.87 * VOXEL_MM + STEP_MM, "{p}");
+                assert!(p.x * side.lateral_sign() < SHELL_END_MM);
+            }
+            // The part of the sphere below the rim's plane, as the hits' share of all rays.
+            let share = acetabulum.surface.len() as f64 / RAYS as f64;
+            let expected = 0.5 * (1.0 + SHELL_END_MM / SHELL_MM[0]);
+            assert!((share - expected).abs() < 0.02, "{share} {expected}");
+        }
+    }
+
+    #[test]
+    fn clearance_is_the_nearest_points_distance() {
+        let hip = block_hip(Side::Left);
+        let acetabulum = Acetabulum::of(&hip).unwrap();
+        let plane = Plane::through(&Point::new(0.0, 40.0, 0.0), &Vector::y());
+        let (radius, _) = crate::surgery::block_hip::rim_circle();
+        assert!((acetabulum.clearance_mm(&plane) - (40.0 - radius)).abs() < 1e-9);
+        let cutting = Plane::through(&Point::new(0.0, 10.0, 0.0), &Vector::y());
+        assert!((acetabulum.clearance_mm(&cutting) - (10.0 - radius)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_hip_without_rim_or_bone_is_refused() {
+        let hip = crate::surgery::toy_hip::toy_hip(Side::Left);
+        assert!(matches!(
+            Acetabulum::of(&hip),
+            Err(AcetabulumError::NoRim { points: 0, .. })
+        ));
+        let bare = crate::surgery::block_hip::block_hip_without(Side::Left, |_, _, _| true);
+        assert!(matches!(
+            Acetabulum::of(&bare),
+            Err(AcetabulumError::NoSurface { hits: 0, .. })
+        ));
+    }
+}

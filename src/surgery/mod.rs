@@ -1,6 +1,8 @@
 //! Cuts, the fragment, collisions and K-wires.
 
 pub mod acetabulum;
+#[cfg(test)]
+pub(crate) mod block_hip;
 pub mod collision;
 pub mod cuts;
 pub mod fragment;

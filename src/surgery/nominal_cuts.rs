@@ -224,3 +224,163 @@ fn steepest_slope(p: &Vector, clearance: f64) -> f64 {
 fn lowest_rise(p: &Vector, clearance: f64) -> f64 {
     p.y.atan2(-p.z) + (clearance / p.norm()).clamp(-1.0, 1.0).asin()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::anatomy::Side;
+    use crate::surgery::block_hip::{
+        BORDER_MM, SHELL_MM, VOXEL_MM, block_hip, block_hip_without, rim_circle,
+    };
+
+    fn cuts(side: Side) -> CutPlanes {
+        nominal_cuts(&block_hip(side), &NominalCutParameters::default()).unwrap()
+    }
+
+    #[test]
+    fn every_cut_clears_the_acetabulum_and_faces_outward() {
+        for side in Side::BOTH {
+            let acetabulum = Acetabulum::of(&block_hip(side)).unwrap();
+            let cuts = cuts(side);
+            for cut in Cut::ALL {
+                let plane = cuts.get(cut);
+                assert!(
+                    acetabulum.clearance_mm(plane) > 8.0 - 1e-9,
+                    "{side} {cut:?}"
+                );
+                assert!((plane.normal.norm() - 1.0).abs() < 1e-12);
+                let along = plane.normal.x.abs();
+                assert_eq!(along, if cut == Cut::Pubis { 1.0 } else { 0.0 }, "{cut:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_posterior_cut_halves_the_column() {
+        let cuts = cuts(Side::Left);
+        let plane = cuts.get(Cut::Posterior);
+        // The border is a straight line, so the cut is parallel to it.
+        assert!(
+            (plane.normal + Vector::z()).norm() < 1e-9,
+            "{:?}",
+            plane.normal
+        );
+        let middle = 0.5 * (rim_circle().0 - BORDER_MM);
+        assert!(
+            (plane.offset_mm - middle).abs() < VOXEL_MM,
+            "{}",
+            plane.offset_mm
+        );
+    }
+
+    #[test]
+    fn the_ilium_cut_runs_from_between_the_spines_to_the_posterior_cut() {
+        let cuts = cuts(Side::Right);
+        let plane = cuts.get(Cut::Ilium);
+        let front = Point::new(0.0, 0.5 * (85.0 + 45.0), 25.0);
+        assert!(plane.signed_distance(&front).abs() < 1e-9);
+        // The rim point nearest to the notch (38, -50) lies in its direction, among points 5 deg
+        // apart.
+        let (radius, notch) = (rim_circle().0, nalgebra::Vector2::new(38.0, BORDER_MM));
+        let height = 0.5 * (notch.x + radius * notch.normalize().x);
+        let back = Point::new(0.0, height, -cuts.get(Cut::Posterior).offset_mm);
+        assert!(
+            plane.signed_distance(&back).abs() < 1.0,
+            "{}",
+            plane.signed_distance(&back)
+        );
+    }
+
+    #[test]
+    fn the_ischium_cut_touches_the_clearance_below_the_rim() {
+        let hip = block_hip(Side::Left);
+        let cuts = cuts(Side::Left);
+        let plane = cuts.get(Cut::Ischium);
+        let back = Point::new(0.0, -rim_circle().0, -cuts.get(Cut::Posterior).offset_mm);
+        assert!(plane.signed_distance(&back).abs() < 1e-9);
+        let clearance = Acetabulum::of(&hip).unwrap().clearance_mm(plane);
+        assert!((clearance - 8.0).abs() < 1e-9, "{clearance}");
+        assert!(
+            plane.normal.y < 0.0 && plane.normal.z < 0.0,
+            "falls forward"
+        );
+    }
+
+    #[test]
+    fn the_pubis_cut_lies_the_clearance_medial_of_the_floor() {
+        for side in Side::BOTH {
+            let cuts = cuts(side);
+            let plane = cuts.get(Cut::Pubis);
+            assert_eq!(plane.normal, -Vector::x() * side.lateral_sign());
+            assert!(
+                (plane.offset_mm - SHELL_MM[0] - 8.0).abs() < 1.5,
+                "{}",
+                plane.offset_mm
+            );
+        }
+    }
+
+    #[test]
+    fn mirrored_hips_have_mirrored_cuts() {
+        let (left, right) = (cuts(Side::Left), cuts(Side::Right));
+        for cut in Cut::ALL {
+            let (l, r) = (left.get(cut), right.get(cut));
+            let mirrored = Vector::new(-l.normal.x, l.normal.y, l.normal.z);
+            assert!((mirrored - r.normal).norm() < 1e-9, "{cut:?}");
+            assert!((l.offset_mm - r.offset_mm).abs() < 1e-9, "{cut:?}");
+        }
+    }
+
+    #[test]
+    fn a_low_ilium_cut_is_lifted_off_the_acetabulum() {
+        let hip = block_hip(Side::Left);
+        let parameters = NominalCutParameters {
+            ilium_fraction: 0.0,
+            clearance_mm: 11.0,
+            posterior_fraction: 0.0,
+            ..Default::default()
+        };
+        let cuts = nominal_cuts(&hip, &parameters).unwrap();
+        let clearance = Acetabulum::of(&hip)
+            .unwrap()
+            .clearance_mm(cuts.get(Cut::Ilium));
+        assert!((clearance - 11.0).abs() < 1e-9, "{clearance}");
+    }
+
+    #[test]
+    fn a_column_without_room_is_an_error_with_numbers() {
+        let thin = block_hip_without(Side::Left, |_, y, z| y < 40.0 && z < -39.0);
+        let error = nominal_cuts(&thin, &NominalCutParameters::default()).unwrap_err();
+        let text = error.to_string();
+        assert!(
+            matches!(error, NominalCutError::NarrowColumn { .. }),
+            "{text}"
+        );
+        assert!(text.contains("toy/left") && text.contains("8 mm"), "{text}");
+    }
+
+    #[test]
+    fn slopes_clear_a_point_by_the_given_distance() {
+        for p in [Vector::new(0.0, 2.0, 25.0), Vector::new(0.0, -9.0, 40.0)] {
+            let slope = steepest_slope(&p, 8.0);
+            let above = Vector::new(0.0, slope.cos(), -slope.sin());
+            assert!((p.dot(&above) - 8.0).abs() < 1e-12);
+            let mirrored = Vector::new(0.0, p.y, -p.z);
+            let rise = lowest_rise(&mirrored, 8.0);
+            let above = Vector::new(0.0, rise.cos(), rise.sin());
+            assert!((mirrored.dot(&above) + 8.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_median_slope_ignores_a_spine() {
+        let border: Vec<Vector> = (0..40)
+            .map(|n| {
+                let y = f64::from(n);
+                let spine = if (10..20).contains(&n) { 8.0 } else { 0.0 };
+                Vector::new(0.0, y, -45.0 + 0.1 * y - spine)
+            })
+            .collect();
+        assert!((median_slope(&border) - 0.1).abs() < 0.02);
+    }
+}

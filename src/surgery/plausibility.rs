@@ -254,3 +254,157 @@ fn ball_of_points(radius_mm: f64) -> Vec<Vector> {
         .filter(|d| d.norm() <= radius_mm)
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::anatomy::Side;
+    use crate::geometry::Plane;
+    use crate::surgery::block_hip::{LANDMARKS, block_hip, block_hip_without};
+    use crate::surgery::nominal_cuts::{NominalCutParameters, nominal_cuts};
+
+    fn nominal(side: Side) -> CutPlanes {
+        nominal_cuts(&block_hip(side), &NominalCutParameters::default()).unwrap()
+    }
+
+    fn verdict(hip: &Hip, cuts: &CutPlanes, rules: &PlausibilityParameters) -> Option<Rejection> {
+        let acetabulum = Acetabulum::of(hip).unwrap();
+        let fragment = FragmentParameters::default();
+        plausible_fragment(hip, &acetabulum, cuts, &fragment, rules)
+            .unwrap()
+            .err()
+    }
+
+    /// A cut moved along its normal, out of the fragment where `mm` is positive.
+    fn shifted(cuts: &CutPlanes, cut: Cut, mm: f64) -> CutPlanes {
+        let plane = *cuts.get(cut);
+        let offset_mm = plane.offset_mm + mm;
+        cuts.with(cut, Plane { offset_mm, ..plane })
+    }
+
+    #[test]
+    fn the_nominal_fragment_is_plausible_and_is_what_is_returned() {
+        let rules = PlausibilityParameters::default();
+        let fragment = FragmentParameters::default();
+        for side in Side::BOTH {
+            let (hip, cuts) = (block_hip(side), nominal(side));
+            let acetabulum = Acetabulum::of(&hip).unwrap();
+            let found = plausible_fragment(&hip, &acetabulum, &cuts, &fragment, &rules);
+            assert_eq!(
+                found.unwrap().unwrap(),
+                carve(&hip, &cuts, &fragment).unwrap(),
+                "{side}"
+            );
+        }
+    }
+
+    #[test]
+    fn each_rule_rejects_with_its_reason() {
+        let side = Side::Left;
+        let (hip, cuts) = (block_hip(side), nominal(side));
+        let rules = PlausibilityParameters::default();
+        for cut in Cut::ALL {
+            let clearance = Acetabulum::of(&hip).unwrap().clearance_mm(cuts.get(cut));
+            let near = shifted(&cuts, cut, 3.9 - clearance);
+            assert_eq!(verdict(&hip, &near, &rules), Some(Rejection::TooClose(cut)));
+            let far_enough = shifted(&cuts, cut, 4.1 - clearance);
+            assert_eq!(verdict(&hip, &far_enough, &rules), None, "{cut:?}");
+        }
+        let high = shifted(&cuts, Cut::Ilium, 40.0);
+        let asis = Rejection::HoldsLandmark(Landmark::Asis);
+        assert_eq!(verdict(&hip, &high, &rules), Some(asis));
+        let back = shifted(&cuts, Cut::Posterior, 9.0);
+        assert_eq!(verdict(&hip, &back, &rules), Some(Rejection::RingBroken));
+        let large = PlausibilityParameters {
+            smallest_cm3: 400.0,
+            largest_cm3: 500.0,
+            ..rules.clone()
+        };
+        assert_eq!(verdict(&hip, &cuts, &large), Some(Rejection::TooSmall));
+        let small = PlausibilityParameters {
+            smallest_cm3: 0.0,
+            largest_cm3: 1.0,
+            ..rules
+        };
+        assert_eq!(verdict(&hip, &cuts, &small), Some(Rejection::TooLarge));
+    }
+
+    #[test]
+    fn a_fragment_that_reaches_the_midline_is_not_free() {
+        let side = Side::Right;
+        let mut hip = block_hip(side);
+        // Without the landmarks of the pubis only the bone itself tells.
+        let mut specimen = (*hip.specimen).clone();
+        specimen.landmarks = Default::default();
+        for (landmark, side, p) in hip.specimen.landmarks.iter() {
+            if !matches!(landmark, Landmark::Sps | Landmark::Mof) {
+                specimen.landmarks.set(landmark, side, p);
+            }
+        }
+        hip.specimen = std::sync::Arc::new(specimen);
+        let wide = shifted(&nominal(side), Cut::Pubis, 60.0);
+        let rules = PlausibilityParameters::default();
+        assert_eq!(verdict(&hip, &wide, &rules), Some(Rejection::NotFree));
+    }
+
+    #[test]
+    fn a_loose_part_of_the_joint_is_noticed() {
+        // One layer of voxels is missing, which cuts the front third of the shell off.
+        let hip = block_hip_without(Side::Left, |_, _, z| (10.0..11.0).contains(&z));
+        let rules = PlausibilityParameters::default();
+        let cuts = nominal(Side::Left);
+        assert_eq!(verdict(&hip, &cuts, &rules), Some(Rejection::JointLost));
+    }
+
+    #[test]
+    fn crumbs_are_allowed_and_pieces_are_not() {
+        let side = Side::Left;
+        let (hip, cuts) = (block_hip(side), nominal(side));
+        let acetabulum = Acetabulum::of(&hip).unwrap();
+        let fragment = FragmentParameters::default();
+        let mut carving = carve(&hip, &cuts, &fragment).unwrap();
+        let grid = &hip.specimen.labels.grid;
+        let all = carving.fragment.len();
+        let rules = PlausibilityParameters::default();
+        let without_layer = |carving: &Carving, at: usize| {
+            let keep = |&o: &usize| grid.voxel(o)[2] != at;
+            Carving {
+                fragment: carving.fragment.iter().copied().filter(keep).collect(),
+                ..carving.clone()
+            }
+        };
+        // Layers of constant height: one below the top leaves a crumb above it, one in the middle
+        // two large pieces.
+        let crumb = without_layer(&carving, carving.bounds.1[2] - 3);
+        let found = check_bone(&hip, &acetabulum, &crumb, &fragment, &rules).unwrap();
+        assert_eq!(found, None);
+        let middle = (carving.bounds.0[2] + carving.bounds.1[2]) / 2;
+        carving = without_layer(&carving, middle);
+        assert!(carving.fragment.len() > all * 9 / 10);
+        let found = check_bone(&hip, &acetabulum, &carving, &fragment, &rules).unwrap();
+        assert_eq!(found, Some(Rejection::InPieces));
+    }
+
+    #[test]
+    fn the_landmarks_of_the_block_hip_are_all_kept() {
+        let cuts = nominal(Side::Left);
+        for (landmark, [u, y, z]) in LANDMARKS {
+            let p = Point::new(u, y, z);
+            let inside = Cut::ALL
+                .iter()
+                .all(|&c| cuts.get(c).signed_distance(&p) < 0.0);
+            assert_eq!(inside, landmark == Landmark::Aiis, "{landmark:?}");
+        }
+    }
+
+    #[test]
+    fn an_empty_volume_range_is_a_problem() {
+        let rules = PlausibilityParameters {
+            smallest_cm3: 200.0,
+            ..Default::default()
+        };
+        let problems = rules.problems();
+        assert_eq!(problems.len(), 1);
+        assert!(problems[0].1.contains("160"), "{problems:?}");
+    }
+}

@@ -202,3 +202,78 @@ fn box_in_grid(hip: &Hip, grid: &Grid, corners: &[Point; 2]) -> Option<([usize; 
         )
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::anatomy::Side;
+    use crate::geometry::Plane;
+    use crate::surgery::block_hip::{BORDER_MM, VOXEL_MM, block_hip, block_hip_without};
+    use crate::surgery::fragment::{FragmentParameters, carve};
+    use crate::surgery::nominal_cuts::{NominalCutParameters, nominal_cuts};
+
+    #[test]
+    fn the_border_is_the_back_of_the_column() {
+        for side in Side::BOTH {
+            let hip = block_hip(side);
+            let acetabulum = Acetabulum::of(&hip).unwrap();
+            let border = posterior_border(&hip, &acetabulum, -29.0..=38.0).unwrap();
+            assert_eq!(border.len(), 68);
+            for p in &border {
+                assert!((p.z - BORDER_MM).abs() <= VOXEL_MM, "{side} {p}");
+            }
+        }
+    }
+
+    #[test]
+    fn bone_behind_a_gap_is_not_the_border() {
+        // What is left behind the gap stands for the sacrum.
+        let hip = block_hip_without(Side::Left, |_, y, z| {
+            y < 40.0 && (-45.0..=-40.0).contains(&z)
+        });
+        let acetabulum = Acetabulum::of(&hip).unwrap();
+        let border = posterior_border(&hip, &acetabulum, -29.0..=35.0).unwrap();
+        assert!(border.iter().all(|p| (p.z + 40.0).abs() <= 2.0 * VOXEL_MM));
+    }
+
+    #[test]
+    fn a_low_notch_is_refused() {
+        let hip = block_hip(Side::Left);
+        let acetabulum = Acetabulum::of(&hip).unwrap();
+        let error = posterior_border(&hip, &acetabulum, -29.0..=-20.0).unwrap_err();
+        assert!(matches!(error, ColumnError::NotchTooLow { .. }));
+    }
+
+    fn holds(hip: &Hip, posterior_mm: f64, column_mm: f64) -> bool {
+        let acetabulum = Acetabulum::of(hip).unwrap();
+        let whole = block_hip(hip.side);
+        let nominal = nominal_cuts(&whole, &NominalCutParameters::default()).unwrap();
+        let plane = Plane {
+            normal: -Vector::z(),
+            offset_mm: posterior_mm,
+        };
+        let cuts = nominal.with(Cut::Posterior, plane);
+        let carving = carve(hip, &cuts, &FragmentParameters::default()).unwrap();
+        column_holds(hip, &acetabulum, &cuts, &carving, column_mm).unwrap()
+    }
+
+    #[test]
+    fn the_column_holds_as_long_as_it_is_thick_enough() {
+        for side in Side::BOTH {
+            let hip = block_hip(side);
+            // 12 and 5 mm are left behind the cut.
+            assert!(holds(&hip, -BORDER_MM - 12.0, 4.0), "{side}");
+            assert!(!holds(&hip, -BORDER_MM - 5.0, 10.0), "{side}");
+            assert!(holds(&hip, -BORDER_MM - 12.0, 8.0), "{side}");
+            assert!(!holds(&hip, -BORDER_MM + 2.0, 0.0), "{side}: cut through");
+        }
+    }
+
+    #[test]
+    fn the_way_round_by_the_pubis_is_no_column() {
+        // A gap across the column below the ilium cut; ischium and ilium still hang together by
+        // the rami and the symphysis.
+        let hip = block_hip_without(Side::Left, |_, y, z| (0.0..6.0).contains(&y) && z < -36.0);
+        assert!(!holds(&hip, -BORDER_MM - 12.0, 4.0));
+    }
+}

@@ -149,3 +149,99 @@ pub fn sample_fragment(
         counts,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::anatomy::{Label, Side};
+    use crate::geometry::Vector;
+    use crate::surgery::block_hip::block_hip;
+    use crate::surgery::nominal_cuts::{NominalCutParameters, nominal_cuts};
+    use crate::surgery::{Acetabulum, Cut};
+
+    fn drawn(side: Side, key: &str) -> (SurgeryMap, RejectionCounts) {
+        let hip = block_hip(side);
+        let nominal = nominal_cuts(&hip, &NominalCutParameters::default()).unwrap();
+        sample_fragment(&hip, &nominal, &Default::default(), 3, key).unwrap()
+    }
+
+    #[test]
+    fn mirrored_hips_and_equal_keys_give_mirrored_surgeries() {
+        for key in ["f00", "f01"] {
+            let (left, left_counts) = drawn(Side::Left, key);
+            let (right, right_counts) = drawn(Side::Right, key);
+            assert_eq!(left_counts, right_counts);
+            for cut in Cut::ALL {
+                let (l, r) = (left.cuts.get(cut), right.cuts.get(cut));
+                let mirrored = Vector::new(-l.normal.x, l.normal.y, l.normal.z);
+                assert!((mirrored - r.normal).norm() < 1e-9, "{cut:?}");
+                assert!((l.offset_mm - r.offset_mm).abs() < 1e-9, "{cut:?}");
+            }
+            // The block hip's grid mirrors onto itself; only the femora have other labels.
+            let ni = left.labels.grid.dims[0];
+            let of_surgery = |v: u8| {
+                [Label::Pelvis, Label::Fragment, Label::Cut]
+                    .into_iter()
+                    .find(|l| l.value() == v)
+            };
+            for (offset, &value) in left.labels.data.iter().enumerate() {
+                let [i, j, k] = left.labels.grid.voxel(offset);
+                let other = right.labels.at(ni - 1 - i, j, k);
+                assert_eq!(of_surgery(value), of_surgery(other), "{key} {i} {j} {k}");
+            }
+        }
+    }
+
+    #[test]
+    fn draws_are_repeatable_differ_by_key_and_keep_the_rules() {
+        let (a, counts) = drawn(Side::Left, "f00");
+        assert_eq!((a.clone(), counts), drawn(Side::Left, "f00"));
+        let (b, _) = drawn(Side::Left, "f01");
+        assert_ne!(a.cuts, b.cuts);
+        let acetabulum = Acetabulum::of(&block_hip(Side::Left)).unwrap();
+        for cut in Cut::ALL {
+            assert!(acetabulum.clearance_mm(a.cuts.get(cut)) >= 4.0);
+        }
+    }
+
+    #[test]
+    fn giving_up_says_why() {
+        let hip = block_hip(Side::Left);
+        let nominal = nominal_cuts(&hip, &NominalCutParameters::default()).unwrap();
+        let mut parameters = FragmentSamplingParameters {
+            max_draws: 7,
+            ..Default::default()
+        };
+        parameters.plausibility.clearance_mm = 20.0;
+        let error = sample_fragment(&hip, &nominal, &parameters, 3, "f00").unwrap_err();
+        let text = error.to_string();
+        let SampleError::NothingPlausible { counts, .. } = error else {
+            panic!("{text}");
+        };
+        assert_eq!(counts.total(), 7);
+        assert!(
+            text.contains("x ilium cut too close to the acetabulum"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn counts_add_up() {
+        let mut counts = RejectionCounts::default();
+        counts.add(Rejection::RingBroken);
+        counts.add(Rejection::TooSmall);
+        let mut sum = counts.clone();
+        sum.merge(&counts);
+        assert_eq!(sum.total(), 4);
+        assert_eq!(sum.to_string(), "2 x too small, 2 x pelvic ring broken");
+    }
+
+    #[test]
+    fn problems_carry_the_path_of_the_field() {
+        let mut parameters = FragmentSamplingParameters::default();
+        parameters.random_cuts.pubis.rotation_sd_deg = 200.0;
+        parameters.max_draws = 0;
+        let fields: Vec<String> = parameters.problems().into_iter().map(|(f, _)| f).collect();
+        assert_eq!(fields, ["random_cuts.pubis.rotation_sd_deg", "max_draws"]);
+    }
+}
