@@ -2,7 +2,7 @@
 
 use super::{DetectError, local::Local, outline::Outline};
 use crate::anatomy::Side;
-use crate::geometry::{Point, Vector};
+use crate::geometry::Point;
 use crate::volume::Surface;
 use nalgebra::Vector2;
 
@@ -22,14 +22,21 @@ pub(super) fn greater_sciatic_notch(
         side,
         reason: reason.into(),
     };
-    let back_and_down = Vector::new(0.0, -1.0, -1.0);
-    let reach = |p: &Point| local.coordinates(p).dot(&back_and_down);
+    // The ilium's end: where a line turned up from behind about the spine first meets it.
+    let spine = local.coordinates(ischial_spine);
+    let elevation = |p: &Point| {
+        let c = local.coordinates(p) - spine;
+        c.y.atan2(-c.z)
+    };
     let ilium = hip
         .vertices()
         .iter()
-        .filter(|p| local.coordinates(p).y > radius_mm)
-        .max_by(|a, b| reach(a).total_cmp(&reach(b)))
-        .ok_or_else(|| not_found("the hip bone ends at the femoral head's level"))?;
+        .filter(|p| {
+            let c = local.coordinates(p);
+            c.y > radius_mm && c.z < spine.z
+        })
+        .min_by(|a, b| elevation(a).total_cmp(&elevation(b)))
+        .ok_or_else(|| not_found("no part of the ilium lies behind the ischial spine"))?;
     let [_, superior, anterior] = local.axes;
     let outline = Outline::new(hip, local.origin, anterior, superior);
     let flat = |p: &Point| {

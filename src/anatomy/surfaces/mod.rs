@@ -2,9 +2,18 @@
 //!
 //! Surfaces carry no density, so Hounsfield values are assigned by rule and the specimen says so.
 
+mod body;
+mod bone_density;
 mod bone_files;
 mod error;
+mod import;
+mod noise;
+mod parameters;
 mod ply;
+mod soft_tissue;
+mod voxelize;
 
 pub use bone_files::{BONE_FILES, read_bone_surfaces};
 pub use error::ImportError;
+pub use import::{SurfacesOrigin, specimen_from_surfaces};
+pub use parameters::SurfacesParameters;

@@ -1,0 +1,295 @@
+//! Bone surfaces to a specimen.
+
+use super::body::Body;
+use super::bone_density::{BoneTissue, DepthProfile, smooth_step};
+use super::error::ImportError;
+use super::noise::GaussianField;
+use super::parameters::SurfacesParameters;
+use super::soft_tissue::soft_tissue;
+use super::voxelize::for_each_inside;
+use crate::anatomy::detect::{BoneSurfaces, Detected, detect};
+use crate::anatomy::{Label, Side, Source, Specimen};
+use crate::geometry::{Point, Vector};
+use crate::random::{Purpose, Stream, stream};
+use crate::volume::distance::squared_distance;
+use crate::volume::{Grid, Surface, Volume};
+use rand::RngExt;
+use rand_distr::StandardNormal;
+use rayon::prelude::*;
+
+/// What people know about a specimen and surfaces do not say.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurfacesOrigin {
+    /// Letters, digits and `-`.
+    pub name: String,
+    /// `male`, `female` or `unknown`.
+    pub sex: String,
+    /// Licence of the surfaces.
+    pub licence: String,
+    /// Where the surfaces come from, for people.
+    pub from: String,
+}
+
+/// Scales of the trabecular texture (mm), in equal parts; fitted to the correlation of the
+/// Visible Human Male's.
+const TEXTURE_MM: [f64; 2] = [1.1, 4.0];
+
+/// Scale over which the cortical shell grows thicker or thinner (mm).
+const SHELL_MM: f64 = 10.0;
+
+/// Below the head's centre, the femur passes from spongy bone to a tube between these (mm).
+const SHAFT_MM: (f64, f64) = (55.0, 110.0);
+
+/// A bone of the import: its surface, its label, and what it is made of.
+struct Bone<'a> {
+    surface: &'a Surface,
+    /// Opposite corners of the box around the surface.
+    corners: (Point, Point),
+    label: Label,
+    kind: Kind,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Sacrum,
+    Hip(Side),
+    Femur(Side),
+}
+
+/// Makes a specimen from bone surfaces: voxels of [`SurfacesParameters::voxel_mm`] from
+/// `below_heads_mm` below the femoral heads to above the iliac crests, with landmarks and rims by
+/// [`detect`] and assigned densities. The same surfaces, parameters and name give the same
+/// specimen, to the last bit.
+///
+/// # Errors
+/// When landmarks cannot be found.
+///
+/// # Panics
+/// When a parameter is out of its range ([`SurfacesParameters::problems`]).
+pub fn specimen_from_surfaces(
+    bones: &BoneSurfaces,
+    origin: &SurfacesOrigin,
+    parameters: &SurfacesParameters,
+) -> Result<Specimen, ImportError> {
+    assert_eq!(parameters.problems(), vec![], "parameters in range");
+    let found = detect(bones)?;
+    let heads = found.heads.map(|h| h.center);
+    let body = Body::around(bones, heads, parameters);
+    let grid = grid(bones, &body, heads, parameters);
+    let list = [
+        Bone::new(&bones.hips[0], Label::Pelvis, Kind::Hip(Side::Left)),
+        Bone::new(&bones.hips[1], Label::Pelvis, Kind::Hip(Side::Right)),
+        Bone::new(&bones.sacrum, Label::Pelvis, Kind::Sacrum),
+        Bone::new(&bones.femurs[0], Label::FemurLeft, Kind::Femur(Side::Left)),
+        Bone::new(
+            &bones.femurs[1],
+            Label::FemurRight,
+            Kind::Femur(Side::Right),
+        ),
+    ];
+    let which = bone_numbers(&list, &grid);
+    let labels = which.map(|n| match n {
+        0 => Label::Background.value(),
+        n => list[usize::from(n) - 1].label.value(),
+    });
+    let mut stream = stream(parameters.seed, Purpose::AssignedDensity, &origin.name);
+    let ct = assigned_ct(&list, &which, &body, &found, parameters, &mut stream);
+    Ok(Specimen {
+        name: origin.name.clone(),
+        source: source(origin, parameters),
+        ct,
+        labels,
+        landmarks: found.landmarks,
+        rims: found.rims,
+    })
+}
+
+impl<'a> Bone<'a> {
+    fn new(surface: &'a Surface, label: Label, kind: Kind) -> Self {
+        let mut low = Vector::repeat(f64::MAX);
+        let mut high = Vector::repeat(f64::MIN);
+        for v in surface.vertices() {
+            low = low.inf(&v.coords);
+            high = high.sup(&v.coords);
+        }
+        Self {
+            surface,
+            corners: (low.into(), high.into()),
+            label,
+            kind,
+        }
+    }
+}
+
+fn source(origin: &SurfacesOrigin, p: &SurfacesParameters) -> Source {
+    Source {
+        kind: "surfaces".into(),
+        description: format!(
+            "Bone surfaces from {}. Only sacrum, hip bones and femora were there: no spine. \
+             Hounsfield values are assigned by depth below the surfaces and the body around the \
+             bones is made up (seed {}, cortical bone {} HU, {} mm). Landmarks and rims were found \
+             by rule.",
+            origin.from, p.seed, p.cortical_hu, p.cortical_mm
+        ),
+        licence: origin.licence.clone(),
+        sex: origin.sex.clone(),
+        assigned_density: true,
+    }
+}
+
+/// The grid of the CT: the body between its ends, and air around it.
+fn grid(bones: &BoneSurfaces, body: &Body, heads: [Point; 2], p: &SurfacesParameters) -> Grid {
+    let low_z = (heads[0].z + heads[1].z) / 2.0 - p.below_heads_mm;
+    let pelvis = bones.hips.iter().chain([&bones.sacrum]);
+    let high_z = pelvis
+        .flat_map(|s| s.vertices())
+        .map(|v| v.z)
+        .fold(f64::MIN, f64::max)
+        + p.above_bones_mm;
+    let (low, high) = body.bounds(low_z, high_z);
+    let air = Vector::new(p.air_mm, p.air_mm, 0.0);
+    let (low, high) = (low - air, high + air);
+    let dims = std::array::from_fn(|a| ((high[a] - low[a]) / p.voxel_mm).ceil() as usize + 1);
+    Grid::axis_aligned(dims, p.voxel_mm, low)
+}
+
+/// 1 + the number in `list` of the bone at each voxel, or 0. Bones that overlap, as segmented
+/// bones may by a fraction of a voxel, keep the one that is named first.
+fn bone_numbers(list: &[Bone], grid: &Grid) -> Volume<u8> {
+    let mut which = Volume::filled(grid.clone(), 0u8);
+    for (n, bone) in list.iter().enumerate() {
+        for_each_inside(bone.surface, grid, |offset| {
+            if which.data[offset] == 0 {
+                which.data[offset] = n as u8 + 1;
+            }
+        });
+    }
+    which
+}
+
+fn assigned_ct(
+    list: &[Bone],
+    which: &Volume<u8>,
+    body: &Body,
+    found: &Detected,
+    p: &SurfacesParameters,
+    stream: &mut Stream,
+) -> Volume<i16> {
+    let grid = &which.grid;
+    let bones = which.map(|n| n != 0);
+    let pelvis = which.map(|n| (1..=3).contains(&n));
+    let mut hu = soft_tissue(body, &bones, &pelvis, p, stream);
+
+    let (low, high) = bone_box(&bones);
+    let mut field = |sigma_mm| GaussianField::new(stream, &low, &high, sigma_mm, p.voxel_mm);
+    let texture = [field(TEXTURE_MM[0]), field(TEXTURE_MM[1])];
+    let shell = field(SHELL_MM);
+    let profile = DepthProfile::new(p);
+    let reach = profile.reach_mm() + p.voxel_mm;
+    let near = squared_distance(&bones);
+    hu.data
+        .par_iter_mut()
+        .enumerate()
+        .filter(|(offset, _)| f64::from(near.data[*offset]) <= reach * reach)
+        .for_each(|(offset, value)| {
+            let at = grid.center(grid.voxel(offset));
+            let texture =
+                (texture[0].at(&at) + texture[1].at(&at)) * std::f32::consts::FRAC_1_SQRT_2;
+            let local = Local {
+                texture: f64::from(texture),
+                shell: f64::from(shell.at(&at)),
+            };
+            let mut excess = 0.0;
+            for (n, bone) in list.iter().enumerate() {
+                let inside = usize::from(which.data[offset]) == n + 1;
+                if !inside && !bone.may_reach(&at, profile.reach_mm()) {
+                    continue;
+                }
+                let Some((closest, _)) = bone.surface.closest_point(&at) else {
+                    continue;
+                };
+                let distance = (closest - at).norm();
+                if inside || distance < profile.reach_mm() {
+                    let depth = if inside { distance } else { -distance };
+                    excess += profile.excess_hu(depth, &bone.tissue(&at, found, &local, p));
+                }
+            }
+            *value += excess as f32;
+        });
+    let noise: Vec<f32> = (0..grid.len())
+        .map(|_| stream.sample::<f32, _>(StandardNormal))
+        .collect();
+    let data = hu
+        .data
+        .par_iter()
+        .zip(noise)
+        .map(|(v, n)| (v + n * p.noise_hu as f32).round().clamp(-1024.0, 3071.0) as i16)
+        .collect();
+    Volume::new(grid.clone(), data)
+}
+
+/// Random values at one place, of variance 1.
+struct Local {
+    texture: f64,
+    shell: f64,
+}
+
+impl Bone<'_> {
+    /// False where the bone surely is farther than `reach_mm`.
+    fn may_reach(&self, at: &Point, reach_mm: f64) -> bool {
+        let (low, high) = &self.corners;
+        (0..3).all(|a| at[a] > low[a] - reach_mm && at[a] < high[a] + reach_mm)
+    }
+
+    fn tissue(
+        &self,
+        at: &Point,
+        found: &Detected,
+        local: &Local,
+        p: &SurfacesParameters,
+    ) -> BoneTissue {
+        let spread = (p.cortical_spread * local.shell).exp();
+        let texture = p.trabecular_texture_hu * local.texture;
+        let spongy = |cortical_mm: f64, inner_hu: f64| BoneTissue {
+            cortical_hu: p.cortical_hu,
+            cortical_mm: cortical_mm * spread,
+            inner_hu: (inner_hu + texture).max(p.fat_hu),
+        };
+        match self.kind {
+            Kind::Sacrum => spongy(p.cortical_mm * 2.0 / 3.0, p.trabecular_hu * 0.6),
+            Kind::Hip(side) => {
+                // Bone carries the joint's load: its shell and sponge are denser there.
+                let head = &found.heads[side.index()];
+                let beyond = (at - head.center).norm() - head.radius_mm;
+                let joint = 1.0 - smooth_step(5.0, 18.0, beyond);
+                spongy(
+                    p.cortical_mm * (1.0 + 0.5 * joint),
+                    p.trabecular_hu * (1.0 + 0.5 * joint),
+                )
+            }
+            Kind::Femur(side) => {
+                let head = &found.heads[side.index()];
+                let from_head = (at - head.center).norm() / head.radius_mm;
+                let in_head = 1.0 - smooth_step(0.8, 1.3, from_head);
+                let upper = spongy(p.cortical_mm, p.trabecular_hu * (0.7 + 0.9 * in_head));
+                let tube = smooth_step(SHAFT_MM.0, SHAFT_MM.1, head.center.z - at.z);
+                let mix = |a: f64, b: f64| a + (b - a) * tube;
+                BoneTissue {
+                    cortical_hu: mix(upper.cortical_hu, p.shaft_hu),
+                    cortical_mm: mix(upper.cortical_mm, p.shaft_mm),
+                    inner_hu: mix(upper.inner_hu, p.marrow_hu + 0.15 * texture),
+                }
+            }
+        }
+    }
+}
+
+/// Opposite corners of the box around all bones, with the blur's reach.
+fn bone_box(bones: &Volume<bool>) -> (Point, Point) {
+    let grid = &bones.grid;
+    let (min, max) = bones
+        .bounds(|b| b)
+        .unwrap_or(([0; 3], grid.dims.map(|n| n - 1)));
+    let margin = Vector::repeat(4.0 * grid.spacing[0]);
+    (grid.center(min) - margin, grid.center(max) + margin)
+}
