@@ -6,6 +6,7 @@
 use super::key::is_name;
 use super::{Scenario, StrategyParameters};
 use crate::anatomy::phantom::PhantomParameters;
+use crate::anatomy::surfaces::SurfacesParameters;
 use crate::anatomy::{LceApex, Side};
 use crate::geometry::{Point, Vector};
 use crate::simulation::{
@@ -79,10 +80,15 @@ pub struct PopulationSection {
     pub phantoms: Vec<u32>,
     /// Folders of specimens (`pao-sim specimen import` writes them). Default none.
     pub specimens: Vec<PathBuf>,
+    /// Folders of closed bone surfaces (PLY, RAS, mm), each made into a specimen when it is first
+    /// needed. They carry no density: it is assigned by rule. Default none.
+    pub surfaces: Vec<PathBuf>,
     /// Sides that are operated on. Default both.
     pub sides: Vec<Side>,
     /// What the phantom bodies are like.
     pub phantom: PhantomParameters,
+    /// What is assigned to bone surfaces.
+    pub surface_bodies: SurfacesParameters,
 }
 
 impl Default for PopulationSection {
@@ -90,6 +96,8 @@ impl Default for PopulationSection {
         Self {
             phantoms: (1..=6).collect(),
             specimens: Vec::new(),
+            surfaces: Vec::new(),
+            surface_bodies: SurfacesParameters::default(),
             sides: Side::BOTH.to_vec(),
             phantom: PhantomParameters::default(),
         }
@@ -103,6 +111,8 @@ pub enum SpecimenSource {
     Phantom(u32),
     /// A specimen's folder.
     Folder(PathBuf),
+    /// A folder of closed bone surfaces.
+    Surfaces(PathBuf),
 }
 
 impl SpecimenSource {
@@ -110,7 +120,7 @@ impl SpecimenSource {
     pub fn name(&self) -> String {
         match self {
             Self::Phantom(number) => format!("phantom-{number}"),
-            Self::Folder(path) => {
+            Self::Folder(path) | Self::Surfaces(path) => {
                 let name = path.file_name().map(|name| name.to_string_lossy());
                 name.unwrap_or_default().into_owned()
             }
@@ -123,7 +133,8 @@ impl PopulationSection {
     pub fn sources(&self) -> Vec<SpecimenSource> {
         let phantoms = self.phantoms.iter().copied().map(SpecimenSource::Phantom);
         let folders = self.specimens.iter().cloned().map(SpecimenSource::Folder);
-        phantoms.chain(folders).collect()
+        let surfaces = self.surfaces.iter().cloned().map(SpecimenSource::Surfaces);
+        phantoms.chain(folders).chain(surfaces).collect()
     }
 }
 
@@ -406,10 +417,10 @@ impl Config {
         p.distinct("study.scenarios", &study.scenarios);
 
         let population = &self.population;
-        if population.phantoms.is_empty() && population.specimens.is_empty() {
+        if population.sources().is_empty() {
             p.add(
                 "population",
-                "names nobody; set phantoms or specimens".into(),
+                "names nobody; set phantoms, specimens or surfaces".into(),
             );
         }
         if population.phantoms.contains(&0) {
@@ -428,12 +439,12 @@ impl Config {
             if !is_name(name, "-") {
                 let expected = "expected a folder named with letters, digits and -";
                 p.add(
-                    "population.specimens",
+                    "population",
                     format!("names a specimen \"{name}\"; {expected}"),
                 );
             } else if names[..place].contains(name) {
                 p.add(
-                    "population.specimens",
+                    "population",
                     format!("names a second specimen {name}; rename one"),
                 );
             }
@@ -447,6 +458,10 @@ impl Config {
         p.distinct("population.sides", &population.sides);
 
         p.nest("population.phantom", population.phantom.problems());
+        p.nest(
+            "population.surface_bodies",
+            population.surface_bodies.problems(),
+        );
 
         p.count("surgery.fragments", self.surgery.fragments);
         p.nest("surgery.nominal", self.surgery.nominal.problems());

@@ -4,7 +4,7 @@ use super::Config;
 use std::collections::BTreeMap;
 
 /// Keys that say how much is done or how, never what comes out for one registration.
-const FREE: [&str; 11] = [
+const FREE: [&str; 12] = [
     "study.name",
     "study.description",
     "study.reduced",
@@ -12,6 +12,7 @@ const FREE: [&str; 11] = [
     "study.initializations",
     "population.phantoms",
     "population.specimens",
+    "population.surfaces",
     "population.sides",
     "surgery.fragments",
     "movement.movements",

@@ -4,6 +4,7 @@ use super::shared::Shared;
 use super::{Config, Failure, FragmentKey, Scenario, SpecimenSource};
 use crate::anatomy::disk::read_specimen;
 use crate::anatomy::phantom::phantom;
+use crate::anatomy::surfaces::{SurfacesOrigin, read_bone_surfaces, specimen_from_surfaces};
 use crate::anatomy::{Hip, Side, Specimen};
 use crate::registration::{BoneModels, ModelRecipe};
 use crate::simulation::case::{Operation, pelvis_surface};
@@ -96,6 +97,18 @@ impl Preparation {
                 SpecimenSource::Phantom(number) => phantom(number, &self.config.population.phantom),
                 SpecimenSource::Folder(path) => {
                     read_specimen(&path).map_err(|cause| Failure::new("specimen", cause))?
+                }
+                SpecimenSource::Surfaces(path) => {
+                    let origin = SurfacesOrigin {
+                        name: name.to_owned(),
+                        sex: "unknown".into(),
+                        licence: "that of the surfaces".into(),
+                        from: name.to_owned(),
+                    };
+                    let parameters = &self.config.population.surface_bodies;
+                    read_bone_surfaces(&path)
+                        .and_then(|bones| specimen_from_surfaces(&bones, &origin, parameters))
+                        .map_err(|cause| Failure::new("specimen", cause))?
                 }
             };
             Ok(PreparedSpecimen {
