@@ -88,6 +88,11 @@ impl Acetabulum {
         self.rim.iter().chain(&self.surface)
     }
 
+    /// The smallest y of rim and surface: how low the acetabulum reaches.
+    pub fn lowest(&self) -> f64 {
+        self.points().map(|p| p.y).fold(f64::INFINITY, f64::min)
+    }
+
     /// The distance in mm by which the whole acetabulum lies inside a plane; negative where the
     /// plane cuts it.
     pub fn clearance_mm(&self, plane: &Plane) -> f64 {

@@ -10,10 +10,11 @@ pub mod insertion_zone;
 pub mod kwire;
 pub mod nominal_cuts;
 pub mod plausibility;
-mod posterior_column;
+pub mod posterior_column;
 pub mod random_cuts;
 mod ranges;
 pub mod sampling;
+pub mod site;
 #[cfg(test)]
 pub(crate) mod toy_hip;
 
@@ -25,5 +26,7 @@ pub use insertion_zone::ZoneParameters;
 pub use kwire::{KWire, KWireError, KWireModel, KWireParameters, place_kwires};
 pub use nominal_cuts::{NominalCutError, NominalCutParameters, nominal_cuts};
 pub use plausibility::{PlausibilityParameters, Rejection, plausible_fragment};
+pub use posterior_column::PosteriorColumn;
 pub use random_cuts::{CutPivots, RandomCutParameters, random_cuts};
 pub use sampling::{FragmentSamplingParameters, RejectionCounts, SampleError, sample_fragment};
+pub use site::{OsteotomySite, SiteError};

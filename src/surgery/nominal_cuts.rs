@@ -1,8 +1,7 @@
 //! The planned cuts, placed from the anatomy.
 
-use super::acetabulum::{Acetabulum, AcetabulumError};
-use super::posterior_column::{ColumnError, posterior_border};
 use super::ranges::out_of_range;
+use super::site::{OsteotomySite, SiteError};
 use super::{Cut, CutPlanes};
 use crate::anatomy::{Hip, Landmark, frame::FrameError};
 use crate::geometry::{Plane, Point, Vector};
@@ -30,7 +29,7 @@ impl Default for NominalCutParameters {
             clearance_mm: 8.0,
             ilium_fraction: 0.5,
             posterior_fraction: 0.5,
-            column_mm: 4.0,
+            column_mm: 3.0,
         }
     }
 }
@@ -54,9 +53,7 @@ pub enum NominalCutError {
     #[error(transparent)]
     Frame(#[from] FrameError),
     #[error(transparent)]
-    Acetabulum(#[from] AcetabulumError),
-    #[error(transparent)]
-    Column(#[from] ColumnError),
+    Site(#[from] SiteError),
     #[error(
         "the posterior column of {hip} has {gap_mm:.1} mm between acetabulum and sciatic notch; expected {clearance_mm} mm of clearance and {column_mm} mm of column; lower `clearance_mm` or `column_mm`, or give this hip's cuts by hand"
     )]
@@ -67,7 +64,7 @@ pub enum NominalCutError {
         column_mm: f64,
     },
     #[error(
-        "the {} cut of {hip} comes within {clearance_mm:.1} mm of the acetabulum, expected {expected_mm} mm or more; check the landmarks ASIS, AIIS, FH and GSN and the rim, or give this hip's cuts by hand",
+        "the {} cut of {hip} comes within {clearance_mm:.1} mm of the acetabulum, expected {expected_mm} mm or more; check the landmarks ASIS, AIIS and FH and the rim, or give this hip's cuts by hand",
         .cut.name()
     )]
     Clearance {
@@ -83,13 +80,13 @@ pub enum NominalCutError {
 /// Ilium, ischium and posterior contain the LR axis (facts 2.13), so each is a line seen from the
 /// side; there lie the points that they pass through:
 ///
-/// - *posterior*: parallel to the posterior border of the column between sciatic notch and
-///   ischium (the median slope of that border), midway between it and the acetabulum;
+/// - *posterior*: parallel to the posterior border of the column from ischium to sciatic notch
+///   (the median slope of that border), midway between it and the acetabulum;
 /// - *ilium*: from the anterior border midway between AIIS and ASIS to the posterior cut, at the
-///   height midway between the notch and the rim point nearest to it, or higher where it would
-///   not clear the acetabulum;
-/// - *ischium*: from the posterior cut at the level of the lowest rim point forward, as steep as
-///   it takes to pass the clearance below the acetabulum: through the infracotyloid groove;
+///   height midway between the notch's roof and the rim point nearest to it, or higher where it
+///   would not clear the acetabulum;
+/// - *ischium*: from the posterior cut at the level of the acetabulum's lowest point (of the rim, or
+///   of the articular surface where that hangs lower) forward, as steep as it takes to pass the clearance below the acetabulum: through the infracotyloid groove;
 /// - *pubis*: sagittal, the clearance medial of the acetabulum.
 ///
 /// # Errors
@@ -98,23 +95,20 @@ pub fn nominal_cuts(
     hip: &Hip,
     parameters: &NominalCutParameters,
 ) -> Result<CutPlanes, NominalCutError> {
-    let acetabulum = Acetabulum::of(hip)?;
+    let OsteotomySite { acetabulum, column } = OsteotomySite::of(hip)?;
     let clearance = parameters.clearance_mm;
     let in_app = |landmark| {
         hip.landmark(landmark)
             .map(|p| from_the_side(&(hip.app_from_volume * p)))
     };
     let (asis, aiis) = (in_app(Landmark::Asis)?, in_app(Landmark::Aiis)?);
-    let notch = in_app(Landmark::Gsn)?;
     let joint: Vec<Vector> = acetabulum.points().map(from_the_side).collect();
     let rim: Vec<Vector> = acetabulum.rim.iter().map(from_the_side).collect();
-    let lowest_rim = rim.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
 
-    let border = posterior_border(hip, &acetabulum, lowest_rim..=notch.y)?;
-    let up = Vector::new(0.0, 1.0, median_slope(&border)).normalize();
+    let up = Vector::new(0.0, 1.0, median_slope(&column.border)).normalize();
     let backward = up.cross(&Vector::x());
     let joint_reach = reach(&joint, &backward);
-    let gap_mm = -reach(&border, &-backward) - joint_reach;
+    let gap_mm = -reach(&column.border, &-backward) - joint_reach;
     if gap_mm < clearance + parameters.column_mm {
         return Err(NominalCutError::NarrowColumn {
             hip: hip.key(),
@@ -136,6 +130,7 @@ pub fn nominal_cuts(
     };
 
     let ilium_front = aiis + (asis - aiis) * parameters.ilium_fraction;
+    let notch = column.roof();
     let planned = at_height(0.5 * (notch.y + nearest(&rim, &notch).y)) - ilium_front;
     let rise = joint
         .iter()
@@ -144,7 +139,7 @@ pub fn nominal_cuts(
     let ilium_backward = Vector::new(0.0, rise.sin(), -rise.cos());
     let ilium = Plane::through(&ilium_front.into(), &Vector::x().cross(&ilium_backward));
 
-    let ischium_back = at_height(lowest_rim);
+    let ischium_back = at_height(acetabulum.lowest());
     let slope = joint
         .iter()
         .map(|p| steepest_slope(&(p - ischium_back), clearance))
@@ -240,7 +235,7 @@ mod tests {
     #[test]
     fn every_cut_clears_the_acetabulum_and_faces_outward() {
         for side in Side::BOTH {
-            let acetabulum = Acetabulum::of(&block_hip(side)).unwrap();
+            let OsteotomySite { acetabulum, .. } = OsteotomySite::of(&block_hip(side)).unwrap();
             let cuts = cuts(side);
             for cut in Cut::ALL {
                 let plane = cuts.get(cut);
@@ -279,9 +274,9 @@ mod tests {
         let plane = cuts.get(Cut::Ilium);
         let front = Point::new(0.0, 0.5 * (85.0 + 45.0), 25.0);
         assert!(plane.signed_distance(&front).abs() < 1e-9);
-        // The rim point nearest to the notch (38, -50) lies in its direction, among points 5 deg
+        // The rim point nearest to the notch (40, -50) lies in its direction, among points 5 deg
         // apart.
-        let (radius, notch) = (rim_circle().0, nalgebra::Vector2::new(38.0, BORDER_MM));
+        let (radius, notch) = (rim_circle().0, nalgebra::Vector2::new(40.0, BORDER_MM));
         let height = 0.5 * (notch.x + radius * notch.normalize().x);
         let back = Point::new(0.0, height, -cuts.get(Cut::Posterior).offset_mm);
         assert!(
@@ -298,7 +293,10 @@ mod tests {
         let plane = cuts.get(Cut::Ischium);
         let back = Point::new(0.0, -rim_circle().0, -cuts.get(Cut::Posterior).offset_mm);
         assert!(plane.signed_distance(&back).abs() < 1e-9);
-        let clearance = Acetabulum::of(&hip).unwrap().clearance_mm(plane);
+        let clearance = OsteotomySite::of(&hip)
+            .unwrap()
+            .acetabulum
+            .clearance_mm(plane);
         assert!((clearance - 8.0).abs() < 1e-9, "{clearance}");
         assert!(
             plane.normal.y < 0.0 && plane.normal.z < 0.0,
@@ -341,8 +339,9 @@ mod tests {
             ..Default::default()
         };
         let cuts = nominal_cuts(&hip, &parameters).unwrap();
-        let clearance = Acetabulum::of(&hip)
+        let clearance = OsteotomySite::of(&hip)
             .unwrap()
+            .acetabulum
             .clearance_mm(cuts.get(Cut::Ilium));
         assert!((clearance - 11.0).abs() < 1e-9, "{clearance}");
     }

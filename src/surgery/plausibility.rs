@@ -5,6 +5,7 @@ use super::acetabulum::Acetabulum;
 use super::fragment::{Carving, FragmentError, FragmentParameters, carve, helper_planes};
 use super::posterior_column::column_holds;
 use super::ranges::out_of_range;
+use super::site::OsteotomySite;
 use super::{Cut, CutPlanes};
 use crate::anatomy::frame::FrameError;
 use crate::anatomy::{Hip, Label, Landmark};
@@ -125,15 +126,15 @@ const KEPT_LANDMARKS: [Landmark; 6] = [
 /// that it breaks.
 ///
 /// # Errors
-/// When ASIS or GSN is missing (not when the fragment is implausible).
+/// When an ASIS is missing (not when the fragment is implausible).
 pub fn plausible_fragment(
     hip: &Hip,
-    acetabulum: &Acetabulum,
+    site: &OsteotomySite,
     cuts: &CutPlanes,
     fragment: &FragmentParameters,
     rules: &PlausibilityParameters,
 ) -> Result<Result<Carving, Rejection>, FrameError> {
-    if let Some(rejection) = check_planes(hip, acetabulum, cuts, rules) {
+    if let Some(rejection) = check_planes(hip, &site.acetabulum, cuts, rules) {
         return Ok(Err(rejection));
     }
     let carving = match carve(hip, cuts, fragment) {
@@ -146,9 +147,9 @@ pub fn plausible_fragment(
             return Ok(Err(Rejection::NoBone));
         }
     };
-    let rejection = check_bone(hip, acetabulum, &carving, fragment, rules)?;
+    let rejection = check_bone(hip, &site.acetabulum, &carving, fragment, rules)?;
     let rejection = match rejection {
-        None if !column_holds(hip, acetabulum, cuts, &carving, rules.column_mm)? => {
+        None if !column_holds(hip, site, cuts, &carving, rules.column_mm)? => {
             Some(Rejection::RingBroken)
         }
         other => other,
@@ -268,9 +269,9 @@ mod tests {
     }
 
     fn verdict(hip: &Hip, cuts: &CutPlanes, rules: &PlausibilityParameters) -> Option<Rejection> {
-        let acetabulum = Acetabulum::of(hip).unwrap();
+        let site = OsteotomySite::of(hip).unwrap();
         let fragment = FragmentParameters::default();
-        plausible_fragment(hip, &acetabulum, cuts, &fragment, rules)
+        plausible_fragment(hip, &site, cuts, &fragment, rules)
             .unwrap()
             .err()
     }
@@ -288,8 +289,8 @@ mod tests {
         let fragment = FragmentParameters::default();
         for side in Side::BOTH {
             let (hip, cuts) = (block_hip(side), nominal(side));
-            let acetabulum = Acetabulum::of(&hip).unwrap();
-            let found = plausible_fragment(&hip, &acetabulum, &cuts, &fragment, &rules);
+            let site = OsteotomySite::of(&hip).unwrap();
+            let found = plausible_fragment(&hip, &site, &cuts, &fragment, &rules);
             assert_eq!(
                 found.unwrap().unwrap(),
                 carve(&hip, &cuts, &fragment).unwrap(),

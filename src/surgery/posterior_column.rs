@@ -3,72 +3,94 @@
 
 use super::acetabulum::Acetabulum;
 use super::fragment::{Carving, midline};
+use super::site::OsteotomySite;
 use super::{Cut, CutPlanes};
 use crate::anatomy::frame::FrameError;
-use crate::anatomy::{Hip, Label, Landmark};
+use crate::anatomy::{Hip, Label};
 use crate::geometry::{Point, Vector};
 use crate::volume::components::components;
 use crate::volume::{Grid, Volume, morphology};
-use std::ops::RangeInclusive;
 
 /// Part of each axial slice that is looked at, in mm from the femoral head: medial, lateral,
 /// backward, forward.
 const SLICE_MM: [f64; 4] = [70.0, 50.0, 110.0, 60.0];
 /// Distance in mm of slices, and of the points in them.
 const STEP_MM: f64 = 1.0;
-/// Fewest slices that make a border.
-const FEWEST_SLICES: usize = 15;
+/// How far behind its frontmost point (mm) the border lies where the notch has ended: above its
+/// roof the ilium reaches back to the sacrum. The ischial spine stands out less.
+const NOTCH_DEPTH_MM: f64 = 25.0;
+/// Height in mm above the acetabulum's lowest point up to which the notch is looked for.
+const SEARCH_MM: f64 = 130.0;
+/// Smallest height of the notch's roof above that point, in mm.
+const LOWEST_ROOF_MM: f64 = 15.0;
 
 /// Why the border is not found.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ColumnError {
     #[error(
-        "the sciatic notch (GSN) of {hip} lies {height_mm:.1} mm above the lowest rim point, expected {FEWEST_SLICES} mm or more; check both"
+        "no roof of the sciatic notch of {hip} between {LOWEST_ROOF_MM} and {SEARCH_MM} mm above the acetabulum's lowest point (the back of the bone there lies at {last_mm:.0} mm); check the rim, the landmarks ASIS and IPS and the label map, or give this hip's cuts by hand"
     )]
-    NotchTooLow { hip: String, height_mm: f64 },
+    NoNotch { hip: String, last_mm: f64 },
     #[error(
         "no pelvis behind the femoral head of {hip} at a height of {height_mm:.1} mm above its centre; check that the label map holds the pelvis as 1"
     )]
     NoBone { hip: String, height_mm: f64 },
 }
 
-/// The hindmost points of the posterior column, seen from the side (x = 0), at `heights` (y in the
-/// APP) from low to high in steps of 1 mm.
-///
-/// In each axial slice the bone that is connected with the posterior wall of the acetabulum
-/// counts: below the notch the sacrum is not.
-///
-/// # Errors
-/// When the heights span too little, or there is no bone at one of them.
-pub fn posterior_border(
-    hip: &Hip,
-    acetabulum: &Acetabulum,
-    heights: RangeInclusive<f64>,
-) -> Result<Vec<Vector>, ColumnError> {
-    let span = heights.end() - heights.start();
-    if span < FEWEST_SLICES as f64 * STEP_MM {
-        return Err(ColumnError::NotchTooLow {
-            hip: hip.key(),
-            height_mm: span,
-        });
-    }
-    let mut wall = Point::origin();
-    for p in &acetabulum.rim {
-        if p.z < wall.z {
-            wall = *p;
+/// The posterior column seen from the side: points of the sagittal plane through the femoral head
+/// (x = 0 in the APP).
+#[derive(Clone, Debug)]
+pub struct PosteriorColumn {
+    /// Its hindmost points from the level of the acetabulum's lowest point up to the roof of the
+    /// greater sciatic notch, in steps of 1 mm.
+    pub border: Vec<Vector>,
+}
+
+impl PosteriorColumn {
+    /// Follows the border upward. In each axial slice the bone that is connected with the posterior
+    /// wall of the acetabulum counts: below the notch's roof the sacrum is not.
+    ///
+    /// The landmark GSN is not asked: people place it anywhere on the notch's front edge.
+    ///
+    /// # Errors
+    /// When there is no bone at the level of the acetabulum, or the notch has no roof.
+    pub fn of(hip: &Hip, acetabulum: &Acetabulum) -> Result<Self, ColumnError> {
+        let mut wall = Point::origin();
+        for p in &acetabulum.rim {
+            if p.z < wall.z {
+                wall = *p;
+            }
         }
-    }
-    (0..=(span / STEP_MM) as usize)
-        .map(|n| {
-            let y = heights.start() + n as f64 * STEP_MM;
+        let lowest = acetabulum.lowest();
+        let mut border: Vec<Vector> = Vec::new();
+        let mut frontmost = f64::NEG_INFINITY;
+        for n in 0..=(SEARCH_MM / STEP_MM) as usize {
+            let y = lowest + n as f64 * STEP_MM;
             let z = hindmost(hip, y, &wall).ok_or_else(|| ColumnError::NoBone {
                 hip: hip.key(),
                 height_mm: y,
             })?;
-            Ok(Vector::new(0.0, y, z))
-        })
-        .collect()
+            if z < frontmost - NOTCH_DEPTH_MM {
+                break;
+            }
+            frontmost = frontmost.max(z);
+            border.push(Vector::new(0.0, y, z));
+        }
+        let height_mm = border.len() as f64 * STEP_MM;
+        if !(LOWEST_ROOF_MM..=SEARCH_MM).contains(&height_mm) {
+            return Err(ColumnError::NoNotch {
+                hip: hip.key(),
+                last_mm: border.last().map_or(f64::NAN, |p| p.z),
+            });
+        }
+        Ok(Self { border })
+    }
+
+    /// The roof of the notch.
+    pub fn roof(&self) -> Vector {
+        *self.border.last().expect("a border is never empty")
+    }
 }
 
 /// The smallest z of the bone in the slice at height `y` that is connected with the bone nearest to
@@ -114,29 +136,24 @@ fn hindmost(hip: &Hip, y: f64, wall: &Point) -> Option<f64> {
     bounds.map(|(min, _)| grid.center(min).y)
 }
 
-/// How far above the notch and below the lowest rim point (mm) bone has to be connected.
+/// How far above the notch's roof and below the acetabulum (mm) bone has to be connected.
 const BEYOND_MM: f64 = 10.0;
 
-/// True if bone at least `column_mm` thick still connects the ischium (below the rim) with the ilium
-/// (above the notch) behind the posterior cut.
+/// True if bone at least `column_mm` thick still connects the ischium (below the acetabulum) with the
+/// ilium (above the notch) behind the posterior cut.
 ///
 /// Counted is bone of this side, behind the head's frontal plane, that lies outside of the ilium,
 /// ischium or posterior cut: neither the way round by the pubic rami nor a strip that the pubis cut
 /// leaves medial of the acetabulum makes a posterior column.
 pub(super) fn column_holds(
     hip: &Hip,
-    acetabulum: &Acetabulum,
+    site: &OsteotomySite,
     cuts: &CutPlanes,
     carving: &Carving,
     column_mm: f64,
 ) -> Result<bool, FrameError> {
-    let notch = hip.app_from_volume * hip.landmark(Landmark::Gsn)?;
-    let lowest_rim = acetabulum
-        .rim
-        .iter()
-        .map(|p| p.y)
-        .fold(f64::INFINITY, f64::min);
-    let (ischium_y, ilium_y) = (lowest_rim - BEYOND_MM, notch.y + BEYOND_MM);
+    let ischium_y = site.acetabulum.lowest() - BEYOND_MM;
+    let ilium_y = site.column.roof().y + BEYOND_MM;
     let midline = midline(hip)?;
     let [_, lateral, backward, _] = SLICE_MM;
     let sign = hip.side.lateral_sign();
@@ -216,12 +233,13 @@ mod tests {
     fn the_border_is_the_back_of_the_column() {
         for side in Side::BOTH {
             let hip = block_hip(side);
-            let acetabulum = Acetabulum::of(&hip).unwrap();
-            let border = posterior_border(&hip, &acetabulum, -29.0..=38.0).unwrap();
-            assert_eq!(border.len(), 68);
-            for p in &border {
+            let site = OsteotomySite::of(&hip).unwrap();
+            for p in &site.column.border {
                 assert!((p.z - BORDER_MM).abs() <= VOXEL_MM, "{side} {p}");
             }
+            // The wing's border steps back at 40 mm.
+            let top = site.column.roof().y;
+            assert!((top - 40.0).abs() <= 1.0 + 0.5 * VOXEL_MM, "{side} {top}");
         }
     }
 
@@ -231,21 +249,28 @@ mod tests {
         let hip = block_hip_without(Side::Left, |_, y, z| {
             y < 40.0 && (-45.0..=-40.0).contains(&z)
         });
-        let acetabulum = Acetabulum::of(&hip).unwrap();
-        let border = posterior_border(&hip, &acetabulum, -29.0..=35.0).unwrap();
-        assert!(border.iter().all(|p| (p.z + 40.0).abs() <= 2.0 * VOXEL_MM));
+        let column = OsteotomySite::of(&hip).unwrap().column;
+        let behind = |p: &Vector| (p.z + 40.0).abs() > 2.0 * VOXEL_MM;
+        assert!(!column.border.iter().any(behind), "{:?}", column.border);
     }
 
     #[test]
-    fn a_low_notch_is_refused() {
-        let hip = block_hip(Side::Left);
-        let acetabulum = Acetabulum::of(&hip).unwrap();
-        let error = posterior_border(&hip, &acetabulum, -29.0..=-20.0).unwrap_err();
-        assert!(matches!(error, ColumnError::NotchTooLow { .. }));
+    fn a_pelvis_without_a_notch_is_refused() {
+        // Nothing is left above the level at which the wing steps back.
+        let hip = block_hip_without(Side::Left, |_, y, _| y > 40.0);
+        let error = OsteotomySite::of(&hip).unwrap_err().to_string();
+        assert!(
+            error.contains("no pelvis behind the femoral head"),
+            "{error}"
+        );
+        // The wing ends in front of the column's border.
+        let hip = block_hip_without(Side::Left, |_, y, z| y > 40.0 && z < -50.0);
+        let error = OsteotomySite::of(&hip).unwrap_err().to_string();
+        assert!(error.contains("no roof of the sciatic notch"), "{error}");
     }
 
     fn holds(hip: &Hip, posterior_mm: f64, column_mm: f64) -> bool {
-        let acetabulum = Acetabulum::of(hip).unwrap();
+        let site = OsteotomySite::of(&block_hip(hip.side)).unwrap();
         let whole = block_hip(hip.side);
         let nominal = nominal_cuts(&whole, &NominalCutParameters::default()).unwrap();
         let plane = Plane {
@@ -254,7 +279,7 @@ mod tests {
         };
         let cuts = nominal.with(Cut::Posterior, plane);
         let carving = carve(hip, &cuts, &FragmentParameters::default()).unwrap();
-        column_holds(hip, &acetabulum, &cuts, &carving, column_mm).unwrap()
+        column_holds(hip, &site, &cuts, &carving, column_mm).unwrap()
     }
 
     #[test]

@@ -1,10 +1,10 @@
 //! Random plausible fragments.
 
 use super::CutPlanes;
-use super::acetabulum::{Acetabulum, AcetabulumError};
 use super::fragment::{FragmentError, FragmentParameters, SurgeryMap};
 use super::plausibility::{PlausibilityParameters, Rejection, plausible_fragment};
 use super::random_cuts::{CutPivots, RandomCutParameters, random_cuts};
+use super::site::{OsteotomySite, SiteError};
 use crate::anatomy::{Hip, frame::FrameError};
 use crate::random::{Purpose, stream};
 use serde::{Deserialize, Serialize};
@@ -104,7 +104,7 @@ pub enum SampleError {
     #[error(transparent)]
     Frame(#[from] FrameError),
     #[error(transparent)]
-    Acetabulum(#[from] AcetabulumError),
+    Site(#[from] SiteError),
     #[error("the nominal cuts are unusable: {0}")]
     Nominal(#[from] FragmentError),
     #[error(
@@ -130,7 +130,7 @@ pub fn sample_fragment(
     seed: u64,
     key: &str,
 ) -> Result<(SurgeryMap, RejectionCounts), SampleError> {
-    let acetabulum = Acetabulum::of(hip)?;
+    let site = OsteotomySite::of(hip)?;
     let pivots = CutPivots::of(hip, nominal, &parameters.fragment)?;
     let mut stream = stream(seed, Purpose::Cuts, key);
     let mut counts = RejectionCounts::default();
@@ -138,7 +138,7 @@ pub fn sample_fragment(
         let spread = &parameters.random_cuts;
         let cuts = random_cuts(nominal, &pivots, hip.side, spread, &mut stream);
         let rules = &parameters.plausibility;
-        match plausible_fragment(hip, &acetabulum, &cuts, &parameters.fragment, rules)? {
+        match plausible_fragment(hip, &site, &cuts, &parameters.fragment, rules)? {
             Ok(carving) => return Ok((carving.into_map(hip, &cuts), counts)),
             Err(rejection) => counts.add(rejection),
         }

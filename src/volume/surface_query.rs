@@ -206,7 +206,7 @@ fn edge(p: &[f64; 3], q: &[f64; 3]) -> (f64, bool) {
 
 /// The point of a triangle closest to `p`, by the region of the plane that `p` projects to
 /// (Ericson 2005, section 5.1.5).
-fn closest_on_triangle(p: &Point, [a, b, c]: &[Point; 3]) -> Point {
+pub(crate) fn closest_on_triangle(p: &Point, [a, b, c]: &[Point; 3]) -> Point {
     let (ab, ac) = (b - a, c - a);
     let (d1, d2) = (ab.dot(&(p - a)), ac.dot(&(p - a)));
     if d1 <= 0.0 && d2 <= 0.0 {

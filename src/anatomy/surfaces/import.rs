@@ -3,6 +3,7 @@
 use super::body::Body;
 use super::bone_density::{BoneTissue, DepthProfile, smooth_step};
 use super::error::ImportError;
+use super::near_surface::near_surface;
 use super::noise::GaussianField;
 use super::parameters::SurfacesParameters;
 use super::soft_tissue::soft_tissue;
@@ -40,11 +41,13 @@ const SHELL_MM: f64 = 10.0;
 /// Below the head's centre, the femur passes from spongy bone to a tube between these (mm).
 const SHAFT_MM: (f64, f64) = (55.0, 110.0);
 
+/// Depths below the surface are exact down to this; deeper, where a bone's value hardly depends on
+/// its depth, voxels are counted (mm).
+const NEAR_MM: f64 = 4.0;
+
 /// A bone of the import: its surface, its label, and what it is made of.
 struct Bone<'a> {
     surface: &'a Surface,
-    /// Opposite corners of the box around the surface.
-    corners: (Point, Point),
     label: Label,
     kind: Kind,
 }
@@ -106,15 +109,8 @@ pub fn specimen_from_surfaces(
 
 impl<'a> Bone<'a> {
     fn new(surface: &'a Surface, label: Label, kind: Kind) -> Self {
-        let mut low = Vector::repeat(f64::MAX);
-        let mut high = Vector::repeat(f64::MIN);
-        for v in surface.vertices() {
-            low = low.inf(&v.coords);
-            high = high.sup(&v.coords);
-        }
         Self {
             surface,
-            corners: (low.into(), high.into()),
             label,
             kind,
         }
@@ -185,37 +181,36 @@ fn assigned_ct(
     let texture = [field(TEXTURE_MM[0]), field(TEXTURE_MM[1])];
     let shell = field(SHELL_MM);
     let profile = DepthProfile::new(p);
-    let reach = profile.reach_mm() + p.voxel_mm;
-    let near = squared_distance(&bones);
-    hu.data
-        .par_iter_mut()
-        .enumerate()
-        .filter(|(offset, _)| f64::from(near.data[*offset]) <= reach * reach)
-        .for_each(|(offset, value)| {
-            let at = grid.center(grid.voxel(offset));
-            let texture =
-                (texture[0].at(&at) + texture[1].at(&at)) * std::f32::consts::FRAC_1_SQRT_2;
-            let local = Local {
-                texture: f64::from(texture),
-                shell: f64::from(shell.at(&at)),
-            };
-            let mut excess = 0.0;
-            for (n, bone) in list.iter().enumerate() {
+    // Centres of voxels lie half a voxel farther from each other than from the surface between.
+    let deep = squared_distance(&bones.map(|b| !b)).map(|d| f64::from(d).sqrt() - p.voxel_mm / 2.0);
+    for (n, bone) in list.iter().enumerate() {
+        let near = near_surface(bone.surface, grid, NEAR_MM.max(profile.reach_mm()));
+        let changes: Vec<(usize, f32)> = near
+            .voxels()
+            .filter_map(|([i, j, k], distance)| {
+                let offset = grid.offset(i, j, k);
                 let inside = usize::from(which.data[offset]) == n + 1;
-                if !inside && !bone.may_reach(&at, profile.reach_mm()) {
-                    continue;
-                }
-                let Some((closest, _)) = bone.surface.closest_point(&at) else {
-                    continue;
+                let distance = f64::from(distance);
+                let depth_mm = match (inside, distance.is_finite()) {
+                    (true, true) => distance,
+                    (true, false) => deep.data[offset].max(NEAR_MM),
+                    (false, _) if distance < profile.reach_mm() => -distance,
+                    (false, _) => return None,
                 };
-                let distance = (closest - at).norm();
-                if inside || distance < profile.reach_mm() {
-                    let depth = if inside { distance } else { -distance };
-                    excess += profile.excess_hu(depth, &bone.tissue(&at, found, &local, p));
-                }
-            }
-            *value += excess as f32;
-        });
+                let at = grid.center([i, j, k]);
+                let fine = f64::from(texture[0].at(&at) + texture[1].at(&at));
+                let local = Local {
+                    texture: fine * std::f64::consts::FRAC_1_SQRT_2,
+                    shell: f64::from(shell.at(&at)),
+                };
+                let tissue = bone.tissue(&at, found, &local, p);
+                Some((offset, profile.excess_hu(depth_mm, &tissue) as f32))
+            })
+            .collect();
+        for (offset, excess) in changes {
+            hu.data[offset] += excess;
+        }
+    }
     let noise: Vec<f32> = (0..grid.len())
         .map(|_| stream.sample::<f32, _>(StandardNormal))
         .collect();
@@ -235,12 +230,6 @@ struct Local {
 }
 
 impl Bone<'_> {
-    /// False where the bone surely is farther than `reach_mm`.
-    fn may_reach(&self, at: &Point, reach_mm: f64) -> bool {
-        let (low, high) = &self.corners;
-        (0..3).all(|a| at[a] > low[a] - reach_mm && at[a] < high[a] + reach_mm)
-    }
-
     fn tissue(
         &self,
         at: &Point,

@@ -7,6 +7,7 @@ mod bone_density;
 mod bone_files;
 mod error;
 mod import;
+mod near_surface;
 mod noise;
 mod parameters;
 mod ply;
