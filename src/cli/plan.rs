@@ -13,6 +13,9 @@ use std::path::PathBuf;
 pub struct Arguments {
     /// Configuration file.
     config: PathBuf,
+    /// Print the whole configuration instead, every key with its value.
+    #[arg(long)]
+    keys: bool,
 }
 
 /// Bytes of a row in journal and table together, measured.
@@ -20,6 +23,10 @@ const BYTES_A_ROW: f64 = 2000.0;
 
 pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let config = Config::read(&arguments.config)?;
+    if arguments.keys {
+        say!("{}", config.to_toml());
+        return Ok(Exit::Complete);
+    }
     let plan = Plan::of(&config);
     let status = StudyFolder::find(&arguments.config, &common.results)
         .and_then(Snapshot::read)

@@ -36,7 +36,7 @@ impl Progress {
     pub fn new(planned: usize, done: usize, failed: usize, json: bool) -> Self {
         let bar = (!json && std::io::stderr().is_terminal()).then(|| {
             let bar = ProgressBar::new(planned as u64).with_position(done as u64);
-            let template = "{elapsed_precise} [{bar:40}] {pos}/{len} registrations {msg}";
+            let template = "{elapsed_precise} [{bar:40}] {pos}/{len} registrations{msg}";
             let style = ProgressStyle::with_template(template);
             bar.set_style(style.expect("the template is a constant that a test passes"));
             bar
@@ -86,7 +86,7 @@ impl Progress {
                 } else if !self.json && counts.last_line.elapsed() >= LINE_EVERY {
                     counts.last_line = Instant::now();
                     let (done, planned) = (counts.done, self.planned);
-                    eprintln!("{done} of {planned} registrations {}", self.rest(&counts));
+                    eprintln!("{done} of {planned} registrations{}", self.rest(&counts));
                 }
             }
         }
@@ -160,10 +160,8 @@ mod tests {
 
     #[test]
     fn the_bar_and_its_template_work() {
-        ProgressStyle::with_template(
-            "{elapsed_precise} [{bar:40}] {pos}/{len} registrations {msg}",
-        )
-        .unwrap();
+        ProgressStyle::with_template("{elapsed_precise} [{bar:40}] {pos}/{len} registrations{msg}")
+            .unwrap();
         let progress = Progress::new(10, 4, 0, false);
         progress.on(Event::Tick);
         let counts = progress.state.lock().unwrap();

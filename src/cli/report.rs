@@ -29,7 +29,7 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         );
     } else {
         print(&groups);
-        eprintln!("{}", folder.join("report.md").display());
+        eprintln!("{}", folder.join("report.html").display());
     }
     Ok(Exit::Complete)
 }

@@ -4,6 +4,7 @@ pub mod canvas;
 pub mod effort_table;
 pub mod errors_table;
 pub mod histograms;
+pub mod html;
 pub mod numbers;
 pub mod offsets_table;
 pub mod picture;

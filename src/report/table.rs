@@ -19,7 +19,12 @@ impl Table {
     /// GitHub-flavoured Markdown.
     pub fn markdown(&self) -> String {
         let mut out = format!("**{}**\n\n", self.title);
-        let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
+        // A cell is one line, and a bar in it is no end of it.
+        let cell = |text: &String| text.replace('|', "\\|").replace('\n', " ");
+        let line = |cells: &[String]| {
+            let cells: Vec<String> = cells.iter().map(cell).collect();
+            format!("| {} |\n", cells.join(" | "))
+        };
         out += &line(&self.header);
         out += &format!("|{}\n", "---|".repeat(self.header.len()));
         for row in &self.rows {

@@ -5,10 +5,9 @@ use super::histograms::{JointHistograms, LceHistograms};
 use super::numbers::{Summaries, Tests};
 use super::rows::Rows;
 use super::table::Table;
-use super::{effort_table, errors_table, offsets_table, sampling_table, tests_table};
+use super::{effort_table, errors_table, html, offsets_table, sampling_table, tests_table};
 use crate::statistics::StatisticsError;
-use crate::store::COMPLETE;
-use crate::store::durable;
+use crate::store::{COMPLETE, Role, SCHEMA, durable};
 use polars::prelude::{DataFrame, ParquetWriter};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -52,14 +51,16 @@ pub enum ReportError {
 
 /// Writes the report of a study's rows into `folder` and gives its groups.
 ///
-/// `report.md` holds all tables and figures; a folder for each group holds its tables as Markdown,
+/// `report.md` and `report.html` (one page without other files) hold all tables and figures; a folder
+/// for each group holds its tables as Markdown,
 /// CSV and LaTeX and its figures as SVG and PNG; `summaries.parquet` and `tests.parquet` hold the
-/// numbers.
+/// numbers; `columns.md` says what the columns of `registrations.parquet` are.
 ///
 /// # Errors
 /// When a value is not finite or a file cannot be written.
 pub fn write(rows: &Rows, about: &About, folder: &Path) -> Result<Vec<Group>, ReportError> {
-    let (mut groups, mut page) = (Vec::new(), head(rows, about));
+    let mut groups = Vec::new();
+    let (mut page, mut web) = (head(rows, about), web_head(rows, about));
     let (mut summaries, mut tests) = (Summaries::default(), Tests::default());
     for kind in rows.distinct("specimen_kind") {
         let of_kind = rows.with("specimen_kind", &kind);
@@ -73,13 +74,20 @@ pub fn write(rows: &Rows, about: &About, folder: &Path) -> Result<Vec<Group>, Re
             let place = folder.join(&group.name);
             let figures = write_group(&group, &complete, &place)?;
             page += &section(&group, &figures);
+            web += &web_section(&group, &figures, &place)?;
             summaries.add(&group.name, &complete)?;
             tests.add(&group.name, &complete)?;
             groups.push(group);
         }
     }
-    page += &failures(rows);
+    if let Some(failures) = failures(rows) {
+        page += &failures.markdown();
+        web += &html::table(&failures);
+    }
+    web += html::end();
     write_file(&folder.join("report.md"), page.as_bytes())?;
+    write_file(&folder.join("report.html"), web.as_bytes())?;
+    write_file(&folder.join("columns.md"), columns().markdown().as_bytes())?;
     write_frame(&folder.join("summaries.parquet"), summaries.frame())?;
     write_frame(&folder.join("tests.parquet"), tests.frame())?;
     Ok(groups)
@@ -157,7 +165,6 @@ fn write_group(
 }
 
 fn head(rows: &Rows, about: &About) -> String {
-    let planned: usize = about.planned.values().sum();
     let mut text = format!("# Study {}\n\n", about.study);
     if !about.description.is_empty() {
         text += &format!("{}\n\n", about.description);
@@ -165,13 +172,18 @@ fn head(rows: &Rows, about: &About) -> String {
     if !about.reduced.is_empty() {
         text += &format!("**REDUCED STUDY: {}.**\n\n", about.reduced);
     }
+    text + &progress(rows, about) + "\n\n"
+}
+
+/// How many registrations there are, in words.
+fn progress(rows: &Rows, about: &About) -> String {
+    let planned: usize = about.planned.values().sum();
     let complete = rows.with("status", COMPLETE).len();
-    text += &format!("{complete} of {planned} registrations are complete");
+    let text = format!("{complete} of {planned} registrations are complete");
     match rows.len() - complete {
-        0 => text += ".\n\n",
-        failed => text += &format!(", {failed} failed (listed at the end).\n\n"),
+        0 => text + ".",
+        failed => format!("{text}, {failed} failed (listed at the end)."),
     }
-    text
 }
 
 fn section(group: &Group, figures: &[&str]) -> String {
@@ -186,29 +198,78 @@ fn section(group: &Group, figures: &[&str]) -> String {
     text
 }
 
-/// How many registrations failed for which reason.
-fn failures(rows: &Rows) -> String {
-    let mut reasons: BTreeMap<(&str, &str, &str), usize> = BTreeMap::new();
-    let (status, phase, message) = (
-        rows.text("status"),
-        rows.text("phase"),
-        rows.text("message"),
-    );
+/// The page's head as HTML.
+fn web_head(rows: &Rows, about: &About) -> String {
+    let mut text = html::begin(&format!("Study {}", about.study));
+    text += &html::paragraph(&about.description, "");
+    if !about.reduced.is_empty() {
+        text += &html::paragraph(&format!("REDUCED STUDY: {}.", about.reduced), "warning");
+    }
+    text + &html::paragraph(&progress(rows, about), "")
+}
+
+/// A group's tables and its figures, which are put into the page itself.
+fn web_section(group: &Group, figures: &[&str], folder: &Path) -> Result<String, ReportError> {
+    let mut text = html::heading(&group.title);
+    text.extend(group.tables.iter().map(html::table));
+    for figure in figures {
+        let path = folder.join(format!("{figure}.svg"));
+        text += &std::fs::read_to_string(&path).map_err(failed(&path))?;
+    }
+    Ok(text)
+}
+
+/// How many registrations failed for which reason; none when all are complete.
+fn failures(rows: &Rows) -> Option<Table> {
+    let mut reasons: BTreeMap<[&str; 3], usize> = BTreeMap::new();
+    let columns = ["status", "phase", "message"].map(|column| rows.text(column));
     for i in 0..rows.len() {
-        if status[i] != COMPLETE {
-            let reason = (status[i].as_str(), phase[i].as_str(), message[i].as_str());
+        let reason = columns.map(|column| column[i].as_str());
+        if reason[0] != COMPLETE {
             *reasons.entry(reason).or_default() += 1;
         }
     }
-    if reasons.is_empty() {
-        return String::new();
+    let line = |(reason, count): (&[&str; 3], &usize)| {
+        let cells = [count.to_string()]
+            .into_iter()
+            .chain(reason.map(String::from));
+        cells.collect()
+    };
+    (!reasons.is_empty()).then(|| Table {
+        name: "failures".into(),
+        title: "Registrations without a result".into(),
+        header: ["number", "status", "phase", "message"]
+            .map(String::from)
+            .to_vec(),
+        rows: reasons.iter().map(line).collect(),
+        notes: vec![
+            "`pao-sim status STUDY --failures` lists each with the command that repeats it.".into(),
+        ],
+    })
+}
+
+/// What the columns of the table of registrations are.
+fn columns() -> Table {
+    let line = |column: &crate::store::Column| {
+        let role = match column.role {
+            Role::Key => "key",
+            Role::Result => "result",
+            Role::Measurement => "measurement",
+        };
+        let kind = format!("{:?}", column.kind).to_lowercase();
+        vec![column.name.clone(), kind, role.into(), column.doc.clone()]
+    };
+    Table {
+        name: "columns".into(),
+        title: "Columns of registrations.parquet".into(),
+        header: ["column", "type", "role", "meaning"].map(String::from).to_vec(),
+        rows: SCHEMA.columns.iter().map(line).collect(),
+        notes: vec![
+            "Results depend on configuration, seed and key alone; measurements tell how it went this time. Angles are \
+             degrees and lengths mm in the hip's anterior pelvic plane: LR = x, IS = y, AP = z."
+                .into(),
+        ],
     }
-    let mut text = "## Registrations without a result\n\n| number | status | phase | message |\n|---|---|---|---|\n".to_owned();
-    for ((status, phase, message), count) in reasons {
-        let message = message.replace('|', "\\|").replace('\n', " ");
-        text += &format!("| {count} | {status} | {phase} | {message} |\n");
-    }
-    text
 }
 
 fn write_frame(
