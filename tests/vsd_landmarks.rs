@@ -1,22 +1,13 @@
 //! Landmarks found by rule on the bones of six people, beside those that five raters placed on
 //! the same bones.
 
+mod data;
+
+use data::SUBJECTS;
 use pao_sim::anatomy::detect::detect;
 use pao_sim::anatomy::surfaces::read_bone_surfaces;
 use pao_sim::anatomy::{Landmark, Side};
 use pao_sim::geometry::Point;
-use std::path::{Path, PathBuf};
-
-const SUBJECTS: [&str; 6] = ["z001", "z013", "z019", "z042", "z046", "z056"];
-
-fn data() -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/vsd");
-    if path.join("landmarks.json").is_file() {
-        return Some(path);
-    }
-    println!("SKIPPED: no bones at {}", path.display());
-    None
-}
 
 /// Mean (LPS) and standard deviation over all axes of one landmark of one subject.
 fn raters(all: &serde_json::Value, subject: &str, side: Side, name: &str) -> (Point, f64) {
@@ -35,7 +26,7 @@ fn raters(all: &serde_json::Value, subject: &str, side: Side, name: &str) -> (Po
 
 #[test]
 fn landmarks_lie_where_raters_place_them() {
-    let Some(data) = data() else { return };
+    let Some(data) = data::vsd() else { return };
     let text = std::fs::read_to_string(data.join("landmarks.json")).unwrap();
     let all: serde_json::Value = serde_json::from_str(&text).unwrap();
     let mut worst = Vec::new();

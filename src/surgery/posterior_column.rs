@@ -21,15 +21,18 @@ const STEP_MM: f64 = 1.0;
 const NOTCH_DEPTH_MM: f64 = 25.0;
 /// Height in mm above the acetabulum's lowest point up to which the notch is looked for.
 const SEARCH_MM: f64 = 130.0;
-/// Smallest height of the notch's roof above that point, in mm.
-const LOWEST_ROOF_MM: f64 = 15.0;
+
+/// Connected bone of a slice up to this area (mm^2) is a crumb and not the posterior column.
+const CRUMB_MM2: f64 = 100.0;
+/// Where the bone of a slice falls into pieces in the next, the least share of a piece that counts.
+const SHARE: f64 = 0.25;
 
 /// Why the border is not found.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ColumnError {
     #[error(
-        "no roof of the sciatic notch of {hip} between {LOWEST_ROOF_MM} and {SEARCH_MM} mm above the acetabulum's lowest point (the back of the bone there lies at {last_mm:.0} mm); check the rim, the landmarks ASIS and IPS and the label map, or give this hip's cuts by hand"
+        "no roof of the sciatic notch of {hip} within {SEARCH_MM} mm above the acetabulum's lowest point (the back of the bone there lies at {last_mm:.0} mm); check the rim, the landmarks ASIS and IPS and the label map, or give this hip's cuts by hand"
     )]
     NoNotch { hip: String, last_mm: f64 },
     #[error(
@@ -48,41 +51,58 @@ pub struct PosteriorColumn {
 }
 
 impl PosteriorColumn {
-    /// Follows the border upward. In each axial slice the bone that is connected with the posterior
-    /// wall of the acetabulum counts: below the notch's roof the sacrum is not.
+    /// Finds the border in axial slices, each from the bone of the slice before: from the posterior
+    /// wall of the acetabulum down to the acetabulum's lowest point, and up to the roof of the notch.
+    /// Where the bone falls into pieces the hindmost one counts: the anterior column is not it, nor
+    /// are the horns of the articular surface, which hang down beside the ischium. The sacrum is
+    /// connected with neither below the roof.
     ///
     /// The landmark GSN is not asked: people place it anywhere on the notch's front edge.
     ///
     /// # Errors
     /// When there is no bone at the level of the acetabulum, or the notch has no roof.
     pub fn of(hip: &Hip, acetabulum: &Acetabulum) -> Result<Self, ColumnError> {
+        let no_bone = |height_mm: f64| ColumnError::NoBone {
+            hip: hip.key(),
+            height_mm,
+        };
         let mut wall = Point::origin();
         for p in &acetabulum.rim {
             if p.z < wall.z {
                 wall = *p;
             }
         }
-        let lowest = acetabulum.lowest();
-        let mut border: Vec<Vector> = Vec::new();
-        let mut frontmost = f64::NEG_INFINITY;
-        for n in 0..=(SEARCH_MM / STEP_MM) as usize {
-            let y = lowest + n as f64 * STEP_MM;
-            let z = hindmost(hip, y, &wall).ok_or_else(|| ColumnError::NoBone {
-                hip: hip.key(),
-                height_mm: y,
-            })?;
-            if z < frontmost - NOTCH_DEPTH_MM {
-                break;
-            }
-            frontmost = frontmost.max(z);
-            border.push(Vector::new(0.0, y, z));
+        let start = Slice::of(hip, wall.y).nearest_to(&wall);
+        let start = start.ok_or_else(|| no_bone(wall.y))?;
+
+        let mut below = Vec::new();
+        let mut slice = start.clone();
+        for n in 1..=((wall.y - acetabulum.lowest()) / STEP_MM) as usize {
+            let y = wall.y - n as f64 * STEP_MM;
+            slice = Slice::of(hip, y)
+                .next_to(&slice)
+                .ok_or_else(|| no_bone(y))?;
+            below.push(Vector::new(0.0, y, slice.hindmost()));
         }
-        let height_mm = border.len() as f64 * STEP_MM;
-        if !(LOWEST_ROOF_MM..=SEARCH_MM).contains(&height_mm) {
-            return Err(ColumnError::NoNotch {
-                hip: hip.key(),
-                last_mm: border.last().map_or(f64::NAN, |p| p.z),
-            });
+        let mut border: Vec<Vector> = below.into_iter().rev().collect();
+
+        let mut frontmost = border.iter().map(|p| p.z).fold(f64::NEG_INFINITY, f64::max);
+        slice = start;
+        let mut y = wall.y;
+        while slice.hindmost() >= frontmost - NOTCH_DEPTH_MM {
+            frontmost = frontmost.max(slice.hindmost());
+            border.push(Vector::new(0.0, y, slice.hindmost()));
+            let height_mm = border.len() as f64 * STEP_MM;
+            y += STEP_MM;
+            slice = Slice::of(hip, y)
+                .next_to(&slice)
+                .ok_or_else(|| no_bone(y))?;
+            if height_mm > SEARCH_MM {
+                return Err(ColumnError::NoNotch {
+                    hip: hip.key(),
+                    last_mm: slice.hindmost(),
+                });
+            }
         }
         Ok(Self { border })
     }
@@ -93,47 +113,84 @@ impl PosteriorColumn {
     }
 }
 
-/// The smallest z of the bone in the slice at height `y` that is connected with the bone nearest to
-/// `wall`.
-fn hindmost(hip: &Hip, y: f64, wall: &Point) -> Option<f64> {
-    let [medial, lateral, backward, forward] = SLICE_MM;
-    let sign = hip.side.lateral_sign();
-    // The slice's own axes: i laterally, j forward.
-    let grid = Grid::axis_aligned(
-        [
-            ((medial + lateral) / STEP_MM) as usize + 1,
-            ((backward + forward) / STEP_MM) as usize + 1,
-            1,
-        ],
-        STEP_MM,
-        Point::new(-medial, -backward, 0.0),
-    );
-    let volume_from_app = hip.app_from_volume.inverse();
-    let labels = &hip.specimen.labels;
-    let bone = Volume::new(
-        grid.clone(),
-        (0..grid.len())
-            .map(|offset| {
-                let p = grid.center(grid.voxel(offset));
-                let in_volume = volume_from_app * Point::new(p.x * sign, y, p.y);
-                labels.nearest(&in_volume) == Some(Label::Pelvis.value())
-            })
-            .collect(),
-    );
-    let pieces = components(&bone);
-    let seed = Point::new(wall.x * sign, wall.z, 0.0);
-    let mut nearest: Option<(f64, u32)> = None;
-    for (offset, &piece) in pieces.labels.data.iter().enumerate() {
-        if piece != 0 {
-            let distance = (grid.center(grid.voxel(offset)) - seed).norm_squared();
-            if nearest.is_none_or(|(best, _)| distance < best) {
-                nearest = Some((distance, piece));
-            }
+/// Bone of one axial slice, on a grid whose i runs laterally and whose j runs forward.
+#[derive(Clone)]
+struct Slice {
+    bone: Volume<bool>,
+    lateral_sign: f64,
+}
+
+impl Slice {
+    /// All pelvis of the slice at height `y`.
+    fn of(hip: &Hip, y: f64) -> Self {
+        let [medial, lateral, backward, forward] = SLICE_MM;
+        let lateral_sign = hip.side.lateral_sign();
+        let points = |reach: f64| (reach / STEP_MM) as usize + 1;
+        let dims = [points(medial + lateral), points(backward + forward), 1];
+        let grid = Grid::axis_aligned(dims, STEP_MM, Point::new(-medial, -backward, 0.0));
+        let volume_from_app = hip.app_from_volume.inverse();
+        let labels = &hip.specimen.labels;
+        let is_bone = |offset| {
+            let p = grid.center(grid.voxel(offset));
+            let in_volume = volume_from_app * Point::new(p.x * lateral_sign, y, p.y);
+            labels.nearest(&in_volume) == Some(Label::Pelvis.value())
+        };
+        let data = (0..grid.len()).map(is_bone).collect();
+        Self {
+            bone: Volume::new(grid, data),
+            lateral_sign,
         }
     }
-    let (_, column) = nearest?;
-    let bounds = pieces.labels.bounds(|piece| piece == column);
-    bounds.map(|(min, _)| grid.center(min).y)
+
+    /// Only the connected bone that comes nearest to a point, crumbs aside.
+    fn nearest_to(self, p: &Point) -> Option<Self> {
+        let pieces = components(&self.bone);
+        let grid = &self.bone.grid;
+        let seed = Point::new(p.x * self.lateral_sign, p.z, 0.0);
+        let mut nearest: Option<(f64, u32)> = None;
+        for (offset, &piece) in pieces.labels.data.iter().enumerate() {
+            if piece != 0 && pieces.sizes[piece as usize - 1] as f64 * STEP_MM * STEP_MM > CRUMB_MM2
+            {
+                let distance = (grid.center(grid.voxel(offset)) - seed).norm_squared();
+                if nearest.is_none_or(|(best, _)| distance < best) {
+                    nearest = Some((distance, piece));
+                }
+            }
+        }
+        let (_, nearest) = nearest?;
+        Some(self.only(&pieces.labels, nearest))
+    }
+
+    /// Only the hindmost connected bone of those that lie over or under the bone of the slice
+    /// before, with at least [`SHARE`] of what the largest of them shares with it.
+    fn next_to(self, before: &Self) -> Option<Self> {
+        let pieces = components(&self.bone);
+        let mut shared = vec![0_usize; pieces.sizes.len()];
+        for (&piece, &bone) in pieces.labels.data.iter().zip(&before.bone.data) {
+            if piece != 0 && bone {
+                shared[piece as usize - 1] += 1;
+            }
+        }
+        let most = shared.iter().copied().max().filter(|&n| n > 0)? as f64;
+        // Rows are ordered from behind, so the first voxel of any of them is the hindmost.
+        let enough =
+            |&&piece: &&u32| piece != 0 && shared[piece as usize - 1] as f64 >= SHARE * most;
+        let hindmost = *pieces.labels.data.iter().find(enough)?;
+        Some(self.only(&pieces.labels, hindmost))
+    }
+
+    fn only(&self, pieces: &Volume<u32>, piece: u32) -> Self {
+        Self {
+            bone: pieces.map(|p| p == piece),
+            lateral_sign: self.lateral_sign,
+        }
+    }
+
+    /// The smallest z of its bone, of which there must be some.
+    fn hindmost(&self) -> f64 {
+        let (min, _) = self.bone.bounds(|b| b).expect("a slice holds bone");
+        self.bone.grid.center(min).y
+    }
 }
 
 /// How far above the notch's roof and below the acetabulum (mm) bone has to be connected.
@@ -252,6 +309,28 @@ mod tests {
         let column = OsteotomySite::of(&hip).unwrap().column;
         let behind = |p: &Vector| (p.z + 40.0).abs() > 2.0 * VOXEL_MM;
         assert!(!column.border.iter().any(behind), "{:?}", column.border);
+    }
+
+    /// As a horn of the articular surface does on some people.
+    #[test]
+    fn a_horn_beside_the_ischium_is_not_the_border() {
+        for side in Side::BOTH {
+            let mut hip = block_hip(side);
+            let mut specimen = (*hip.specimen).clone();
+            let grid = specimen.labels.grid.clone();
+            for offset in 0..grid.len() {
+                let p = hip.app_from_volume * grid.center(grid.voxel(offset));
+                let u = p.x * side.lateral_sign();
+                let beside = (7.5..11.0).contains(&u) && (-31.0..-19.0).contains(&p.y);
+                if beside && (-30.0..-22.0).contains(&p.z) {
+                    specimen.labels.data[offset] = Label::Pelvis.value();
+                }
+            }
+            hip.specimen = std::sync::Arc::new(specimen);
+            let column = OsteotomySite::of(&hip).unwrap().column;
+            let astray = |p: &Vector| (p.z - BORDER_MM).abs() > VOXEL_MM;
+            assert!(!column.border.iter().any(astray), "{:?}", column.border);
+        }
     }
 
     #[test]
