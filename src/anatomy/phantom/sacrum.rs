@@ -27,6 +27,9 @@ const FORAMINA: [[f64; 3]; 4] = [
 
 const PIECES: usize = 8;
 
+/// How far the bone reaches beyond its curve's ends.
+const END_MM: f64 = 1.0;
+
 #[derive(Clone, Debug)]
 pub(super) struct Sacrum {
     curve: Vec<[f64; 4]>,
@@ -110,34 +113,36 @@ impl Sacrum {
     /// Signed distance to the surface, without regard to the hip bones.
     pub fn distance(&self, p: &Point) -> f64 {
         let mut best = (f64::INFINITY, 0.0, 0.0, 0.0, 0.0);
+        let mut whole_length = 0.0;
         for pair in self.curve.windows(2) {
             let (a, b) = (pair[0], pair[1]);
             let (ty, tz) = (b[0] - a[0], b[1] - a[1]);
             let (py, pz) = (p.y - a[0], p.z - a[1]);
-            let length2 = ty * ty + tz * tz;
-            let s = (py * ty + pz * tz) / length2;
+            let length = ty.hypot(tz);
+            let s = (py * ty + pz * tz) / (length * length);
             let h = s.clamp(0.0, 1.0);
             let (ay, az) = (py - h * ty, pz - h * tz);
             let d2 = ay * ay + az * az;
             if d2 < best.0 {
-                let length = length2.sqrt();
-                // Signed: posterior positive; and how far beyond the curve's ends.
+                // Signed: posterior positive; and along the curve, from the base.
                 let across = (-tz * py + ty * pz) / length;
-                let beyond = ((s - h).abs()) * length;
                 let mix = |k: usize| a[k] + h * (b[k] - a[k]);
-                best = (d2, across, beyond, mix(2), mix(3));
+                best = (d2, across, whole_length + s * length, mix(2), mix(3));
             }
+            whole_length += length;
         }
-        let (_, across, beyond, width, thick) = best;
+        let (_, across, from_base, width, thick) = best;
         // The wings of the sacrum are thinner at the back, where the multifidus lies.
         let side = (p.x.abs() / width).min(1.2);
         let half = thick * (1.0 - 0.18 * side * side);
         let shift = 0.12 * thick * side;
         let round = half.min(7.0);
+        // Its upper edge falls off beside the promontory.
+        let fallen = 0.22 * (p.x.abs() - 24.0).max(0.0);
         let q = [
             p.x.abs() - width + round,
             (across + shift).abs() - half + round,
-            beyond - 1.0 + round,
+            (fallen - from_base).max(from_base - whole_length) - END_MM + round,
         ];
         let outside = q.iter().map(|v| v.max(0.0).powi(2)).sum::<f64>().sqrt();
         let plate = outside + q[0].max(q[1]).max(q[2]).min(0.0) - round;
