@@ -61,8 +61,14 @@ impl Femur {
         let greater = Rod::widened(
             vec![
                 node(junction + out * 5.0 * g + up * -8.0, 15.0 * g),
-                node(junction + out * 9.0 * g + behind * 4.0 + up * 9.0, 13.0 * g),
-                node(junction + out * 6.0 * g + behind * 9.0 + up * 23.0, 7.5 * g),
+                node(
+                    junction + out * 10.0 * g + behind * 6.0 + up * 10.0,
+                    12.5 * g,
+                ),
+                node(
+                    junction + out * 7.0 * g + behind * 12.0 + up * 26.0,
+                    7.0 * g,
+                ),
             ],
             behind,
             1.25,
@@ -73,10 +79,10 @@ impl Femur {
             node(junction + shaft * 38.0, r * 1.06),
         ]);
         let lesser = Rod::new(vec![
-            node(junction + shaft * 24.0 - out * 6.0 + behind * 6.0, 9.0 * g),
+            node(junction + shaft * 24.0 - out * 6.0 + behind * 6.0, 10.0 * g),
             node(
-                junction + shaft * 25.0 - out * 13.0 + behind * 15.0,
-                5.5 * g,
+                junction + shaft * 26.0 - out * 14.5 + behind * 13.0,
+                7.5 * g,
             ),
         ]);
         let top = junction + shaft * 30.0;
@@ -89,7 +95,7 @@ impl Femur {
             head,
             head_radius: radius,
             neck,
-            trochanters: vec![(between, 8.0), (greater, 9.0), (lesser, 8.0)],
+            trochanters: vec![(between, 8.0), (greater, 9.0), (lesser, 12.0)],
             fovea,
             shaft_axis: [top, bottom],
             shaft: Rod::new(vec![node(top, r * 1.06), node(bottom, r * 0.95)]),

@@ -53,11 +53,11 @@ impl HipBone {
                     draws,
                     build,
                     &[
-                        [70.0, 30.0, 32.0, 12.5],
-                        [66.0, 34.0, 12.0, 12.0],
-                        [65.0, 34.0, -10.0, 12.5],
-                        [64.0, 34.0, -32.0, 13.0],
-                        [61.0, 35.0, -45.0, 12.0],
+                        [70.0, 26.0, 32.0, 12.5],
+                        [66.0, 31.0, 12.0, 12.0],
+                        [63.5, 33.0, -10.0, 12.5],
+                        [62.0, 35.0, -32.0, 12.5],
+                        [59.0, 34.0, -43.0, 12.0],
                     ],
                     Some(([-0.15, 1.0, 0.0], 1.45)),
                 ),
@@ -79,8 +79,8 @@ impl HipBone {
                     draws,
                     build,
                     &[
-                        [60.0, 38.0, -48.0, 10.0],
-                        [48.0, 26.0, -54.0, 7.5],
+                        [54.0, 33.0, -50.0, 10.0],
+                        [46.0, 25.0, -54.0, 7.5],
                         [34.0, 9.0, -53.0, 6.0],
                         [21.0, -7.0, -45.0, 6.2],
                         [13.0, -18.0, -36.0, 7.0],
@@ -95,11 +95,11 @@ impl HipBone {
                     draws,
                     build,
                     &[
-                        [67.0, -17.0, 17.0, 13.0],
-                        [54.0, -26.0, 9.0, 10.0],
-                        [40.0, -35.0, -2.0, 8.0],
-                        [26.0, -42.0, -11.0, 8.0],
-                        [12.0, -42.0, -15.0, 8.0],
+                        [66.0, -15.0, 16.0, 12.5],
+                        [53.0, -20.0, 6.0, 10.0],
+                        [40.0, -26.0, -3.5, 8.2],
+                        [28.0, -32.0, -12.5, 9.5],
+                        [14.0, -37.0, -19.0, 10.0],
                     ],
                     None,
                 ),
@@ -117,7 +117,7 @@ impl HipBone {
         };
         let lumps = vec![
             // Body of the pubis.
-            (tilted(pubis, [15.0, 24.0, 10.0]), 5.0),
+            (tilted(pubis, [17.0, 24.5, 10.0]), 5.0),
             // Pubic tubercle.
             (
                 Ellipsoid::aligned(draws.place([24.0, -46.0, -13.0], 0.8), [5.5, 5.5, 5.0]),
@@ -126,15 +126,15 @@ impl HipBone {
             // Quadrilateral plate, the flat inner wall behind the socket.
             (
                 Ellipsoid::aligned(
-                    draws.place([61.0, 14.0, 2.0], 0.5),
-                    [8.0, 36.0, 32.0].map(|r| r * build.girth),
+                    draws.place([61.0, 13.0, 4.0], 0.5),
+                    [8.0, 33.0, 25.0].map(|r| r * build.girth),
                 ),
                 8.0,
             ),
             // Ischial tuberosity.
             (
                 Ellipsoid::aligned(
-                    draws.place([63.0, 40.0, -45.0], 0.8),
+                    draws.place([59.0, 37.0, -45.0], 0.8),
                     [13.0, 15.0, 17.0].map(|r| r * build.girth),
                 ),
                 8.0,
@@ -187,11 +187,11 @@ impl HipBone {
         onto_surface(|q| self.distance(q), p)
     }
 
-    /// The surface met from a point of the bone's inside towards `direction`.
-    fn surface_from(&self, inside: &Point, direction: [f64; 3]) -> Point {
+    /// The surface met from a point beside it, in the bone or out of it, towards `direction`.
+    fn surface_from(&self, start: &Point, direction: [f64; 3]) -> Point {
         let d = |q: &Point| self.distance(q);
-        let found = first_crossing(d, inside, &Vector::from(direction), 0.5, 60.0);
-        self.on_surface(&found.unwrap_or(*inside))
+        let found = first_crossing(d, start, &Vector::from(direction), 0.5, 60.0);
+        self.on_surface(&found.unwrap_or(*start))
     }
 
     /// The edge of the obturator foramen: where rays from its middle, in its plane, meet bone.
@@ -221,7 +221,12 @@ impl HipBone {
             Landmark::Ips => self.surface_from(&face(8.0, -8.0), [0.0, 0.72, -0.69]),
             Landmark::Mof => extreme(&self.foramen_edge(), |p| p.x),
             Landmark::Iof => extreme(&self.foramen_edge(), |p| p.z),
-            Landmark::Gsn => self.surface_from(&self.wing.middle(-22.0, 8.0), [-0.35, 0.9, 0.25]),
+            Landmark::Gsn => {
+                // Its roof, where the notch's border is highest: seen from within the notch.
+                let (within, roof) = (self.wing.middle(-58.0, -2.0), self.wing.middle(-42.0, 12.0));
+                let to = roof - within;
+                self.surface_from(&within, [to.x, to.y, to.z])
+            }
         }
     }
 }

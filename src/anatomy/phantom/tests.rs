@@ -175,6 +175,30 @@ fn one_can_look_through_the_obturator_foramen() {
 }
 
 #[test]
+fn the_notch_landmark_is_on_the_roof_of_the_greater_sciatic_notch() {
+    for (n, skeleton) in FIRST.zip(SKELETONS.iter()) {
+        for side in Side::BOTH {
+            let hip = &skeleton.hips[side.index()];
+            let roof = hip.landmark(Landmark::Gsn);
+            assert!(hip.distance(&roof).abs() < 0.05, "phantom-{n} {side}");
+            // Seen from the side: bone above and none below, the column before the notch, and the
+            // ilium on as a roof, 25 mm behind, over open space.
+            let bone = |y: f64, z: f64| {
+                let at = |x: i32| roof + Vector::new(f64::from(2 * x), y, z);
+                (-12..=12).any(|x| hip.distance(&at(x)) < 0.0)
+            };
+            let (low, high) = (-8.0, 12.0);
+            assert!(bone(0.0, 4.0), "phantom-{n} {side}: none above");
+            assert!(bone(-25.0, low), "phantom-{n} {side}: no column before");
+            assert!(bone(25.0, high), "phantom-{n} {side}: no ilium behind");
+            for y in [4.0, 15.0, 25.0] {
+                assert!(!bone(y, low), "phantom-{n} {side}: bone {y} behind");
+            }
+        }
+    }
+}
+
+#[test]
 fn rims_are_closed_dense_and_on_the_edge() {
     for (n, skeleton) in FIRST.zip(SKELETONS.iter()) {
         for side in Side::BOTH {
