@@ -25,7 +25,7 @@ impl BoneDensity {
     /// HU at a place `depth` mm inside a bone, blurred over `blur` mm as a scanner does.
     pub fn hu(&self, s: &Skeleton, bone: Bone, p: &Point, depth: f64, blur: f64) -> f64 {
         let spongy = self.fine.at(p, 2.2) * 75.0 + self.coarse.at(p, 7.0) * 70.0;
-        let uneven = 1.0 + 0.45 * self.shell.at(p, 18.0);
+        let uneven = 1.0 + 0.6 * self.shell.at(p, 18.0);
         let (cortex, hard, soft) = match bone {
             Bone::Hip(side) => {
                 let q = sided(p, side);
@@ -40,9 +40,9 @@ impl BoneDensity {
                         ((q.y - 22.0).powi(2) + (q.z - 42.0).powi(2)).sqrt(),
                     );
                 (
-                    (1.35 + 0.9 * roof + 0.9 * buttress) * uneven,
-                    1180.0,
-                    165.0 + 200.0 * roof,
+                    (0.5 + 0.1 * roof + 0.5 * buttress) * uneven,
+                    1100.0,
+                    140.0 + 180.0 * roof,
                 )
             }
             Bone::Femur(side) => {
@@ -60,18 +60,19 @@ impl BoneDensity {
                 let medial = 1.0 - smooth_step(-6.0, 6.0, q.x - femur.shaft_axis[0].x + 14.0);
                 let calcar = medial * smooth_step(-55.0, -30.0, along) * (1.0 - head);
                 (
-                    (1.1 + 4.6 * shaft + 1.6 * calcar * (1.0 - shaft)) * (0.6 + 0.4 * uneven),
-                    1250.0 + 330.0 * shaft,
-                    120.0 + 200.0 * head - 130.0 * shaft,
+                    (0.45 + 4.6 * shaft + 1.6 * calcar * (1.0 - shaft)) * (0.6 + 0.4 * uneven),
+                    1060.0 + 520.0 * shaft,
+                    120.0 + 80.0 * head - 130.0 * shaft,
                 )
             }
-            Bone::Sacrum => (0.95 * uneven, 950.0, 125.0),
-            Bone::Spine => (0.9 * uneven, 900.0, 150.0),
+            Bone::Sacrum => (0.5 * uneven, 900.0, 125.0),
+            Bone::Spine => (0.5 * uneven, 880.0, 150.0),
         };
-        let cortex = (cortex * s.build.cortex).clamp(0.7, 6.5);
-        let inner = smooth_step(cortex - blur, cortex + blur, depth);
+        let cortex = (cortex * s.build.cortex).clamp(0.3, 6.5);
+        // Beneath the cortex bone thins out gradually.
+        let inner = smooth_step(cortex - blur, cortex + 3.2 * blur, depth);
         let soft = soft * s.build.density + spongy;
-        let hard = hard + self.shell.at(p, 9.0) * 130.0;
+        let hard = hard + self.shell.at(p, 9.0) * 320.0;
         hard + (soft - hard) * inner
     }
 }

@@ -63,42 +63,6 @@ impl Noise {
         }
         sum
     }
-
-    /// Distances (mm) from `p` to the nearest two of randomly scattered seeds, one a lattice cell
-    /// of the given size, and a number in [-1, 1] of the nearest: the cells are bundles and the
-    /// small differences of the two distances their borders.
-    pub fn bundles(&self, p: &Point, size_mm: [f64; 3]) -> (f64, f64, f64) {
-        let q: [f64; 3] = std::array::from_fn(|a| p[a] / size_mm[a]);
-        let base = q.map(|v| v.floor() as i64);
-        let unit = size_mm[0].min(size_mm[1]).min(size_mm[2]);
-        let (mut first, mut second, mut id) = (f64::INFINITY, f64::INFINITY, 0.0);
-        for dk in -1..=1 {
-            for dj in -1..=1 {
-                for di in -1..=1 {
-                    let cell = [base[0] + di, base[1] + dj, base[2] + dk];
-                    let mut d2 = 0.0;
-                    for a in 0..3 {
-                        let shift = self.lattice(
-                            cell[0] * 3 + a as i64,
-                            cell[1] * 3 + 7919,
-                            cell[2] * 3 - 104_729,
-                        );
-                        let d = cell[a] as f64 + 0.5 + 0.4 * shift - q[a];
-                        d2 += d * d;
-                    }
-                    let d = d2.sqrt() * unit;
-                    if d < first {
-                        second = first;
-                        first = d;
-                        id = self.lattice(cell[0], cell[1], cell[2]);
-                    } else if d < second {
-                        second = d;
-                    }
-                }
-            }
-        }
-        (first, second, id)
-    }
 }
 
 #[cfg(test)]

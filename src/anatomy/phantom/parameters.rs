@@ -25,7 +25,7 @@ pub struct PhantomParameters {
     pub table_rotation_sd_deg: f64,
     /// How much left and right differ: 0 gives a symmetric skeleton, 1 (default) what people have.
     pub asymmetry: f64,
-    /// Standard deviation of the CT's noise in HU. Default 12.
+    /// Standard deviation of the CT's noise in HU. Default 17.
     pub noise_hu: f64,
 }
 
@@ -39,7 +39,7 @@ impl Default for PhantomParameters {
             tilt_sd_deg: 6.0,
             table_rotation_sd_deg: 2.0,
             asymmetry: 1.0,
-            noise_hu: 12.0,
+            noise_hu: 17.0,
         }
     }
 }

@@ -4,13 +4,13 @@ use super::distance::{Ellipsoid, Node, Rod, join, smooth_step};
 use super::noise::Noise;
 use super::skeleton::{Skeleton, sided};
 use crate::anatomy::Side;
-use crate::geometry::Point;
+use crate::geometry::{Point, Vector};
 use crate::random::Stream;
 use rand::RngExt;
 
 const AIR_HU: f64 = -1000.0;
-const FAT_HU: f64 = -102.0;
-const MUSCLE_HU: f64 = 54.0;
+const FAT_HU: f64 = -116.0;
+const MUSCLE_HU: f64 = 31.0;
 
 /// Torso: (z above the heads, half width, half depth) in mm; y of its middle is fixed.
 const TORSO: [[f64; 3]; 6] = [
@@ -187,7 +187,8 @@ impl SoftTissue {
                     83.0 * self.size[0] * taper,
                     92.0 * self.size[1] * taper,
                 );
-                let fade = smooth_step(-60.0, 55.0, q.z) * 40.0;
+                // At the top it is gone so far that the join's fillet does not reach the flank.
+                let fade = smooth_step(-60.0, 60.0, q.z) * 90.0;
                 d = join(d, thigh + fade, 25.0);
             }
         }
@@ -249,23 +250,34 @@ impl SoftTissue {
         }
         let cavity = self.cavity(p, hip, column);
         if cavity < 0.0 {
-            return self.organs(world, p, fat);
+            return self.organs(world, p, fat, -cavity);
         }
-        self.muscle(world, fat, cavity, muscle_edge)
+        self.muscle(world, fat, hip, cavity, muscle_edge)
     }
 
-    fn muscle(&self, world: &Point, fat: f64, cavity: f64, edge: f64) -> f64 {
-        let (first, second, id) = self.fascicles.bundles(world, [27.0, 27.0, 95.0]);
-        let wide = 1.4 + 1.6 * (1.0 + self.folds.at(world, 45.0)) * 0.5;
-        let septum = 1.0 - smooth_step(wide * 0.5, wide * 1.2, second - first);
+    fn muscle(&self, world: &Point, fat: f64, hip: f64, cavity: f64, edge: f64) -> f64 {
+        // Planes of fat between muscles: level sets of a field that runs along the body and, near
+        // the ilium, parallel to the bone as the gluteal muscles do.
+        let turned = Point::new(
+            0.83 * world.x - 0.56 * world.y,
+            0.56 * world.x + 0.83 * world.y,
+            world.z,
+        );
+        let field = self.fascicles.stretched(&turned, [44.0, 44.0, 150.0]);
+        let wide = 0.03 + 0.05 * (1.0 + self.folds.at(world, 45.0));
+        let plane = |level: f64| 1.0 - smooth_step(0.4 * wide, wide, level.abs());
+        let gluteal = 1.0 - smooth_step(25.0, 36.0, hip);
+        let layers = gluteal * plane(0.45 * (hip / 15.0 + 1.6 * field).sin());
+        let septum = plane(field).max(layers);
         let marbling = smooth_step(0.50, 0.72, self.folds.stretched(world, [5.0, 5.0, 16.0]));
-        let lean = MUSCLE_HU + 5.0 * id + 12.0 * self.grain.at(world, 3.5);
+        let lean = MUSCLE_HU + 9.0 * self.folds.at(world, 24.0) + 12.0 * self.grain.at(world, 3.5);
         // Fascia lets no fat stripes end at the skin side or at the peritoneum.
         let sheath = smooth_step(0.0, 3.0, cavity.min(-edge));
         lean + (fat - lean) * (septum * sheath).max(0.55 * marbling)
     }
 
-    fn organs(&self, world: &Point, p: &Point, fat: f64) -> f64 {
+    /// `deep` is the depth in the cavity in mm.
+    fn organs(&self, world: &Point, p: &Point, fat: f64, deep: f64) -> f64 {
         let wall = 38.0 + 10.0 * self.grain.at(world, 3.0);
         let bladder = self.bladder.distance(p);
         if bladder < 0.0 {
@@ -288,21 +300,27 @@ impl SoftTissue {
         if p.z < 18.0 {
             return fat;
         }
-        let (first, second, id) = self.bowel.bundles(world, [36.0, 34.0, 30.0]);
-        let loops = 0.5 * (second - first);
-        if loops < 1.2 {
+        // Loops with fat between them along the level set of a bent field.
+        let bend = Vector::new(
+            self.folds.at(world, 30.0),
+            self.folds.at(&(world + Vector::z() * 500.0), 30.0),
+            self.folds.at(&(world - Vector::z() * 500.0), 30.0),
+        );
+        let field = self.bowel.at(&(world + bend * 9.0), 33.0);
+        let loops = field.abs() - 0.06;
+        if loops < 0.0 {
             return fat;
         }
         let stool = 28.0 + 25.0 * self.bowel.at(world, 6.0);
-        // Gas rises: it fills the front of some loops.
-        let gas = if id > 0.35 {
-            smooth_step(4.0, 5.6, loops) * smooth_step(-1.0, 1.0, 4.0 + 8.0 * id - first)
-        } else {
-            0.0
-        };
-        let inner = wall + (stool - wall) * smooth_step(3.0, 4.5, loops);
+        // Gas fills the middle of some loops.
+        let gas = smooth_step(
+            0.40,
+            0.46,
+            field - 0.3 * (1.0 - smooth_step(4.0, 14.0, deep)),
+        );
+        let inner = wall + (stool - wall) * smooth_step(0.10, 0.16, loops);
         let body = inner + (-920.0 - inner) * gas;
-        fat + (body - fat) * smooth_step(1.2, 2.4, loops)
+        fat + (body - fat) * smooth_step(0.0, 0.06, loops)
     }
 }
 

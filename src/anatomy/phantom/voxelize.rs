@@ -18,7 +18,7 @@ const FEMUR_END_MM: f64 = 150.0;
 const ABOVE_CREST_MM: f64 = 32.0;
 const AROUND_SKIN_MM: f64 = 10.0;
 /// Half the width over which the scanner blurs an edge, at 1 mm voxels and finer.
-const BLUR_MM: f64 = 0.65;
+const BLUR_MM: f64 = 1.4;
 /// Standard deviation of [`Noise::at`].
 const NOISE_SD: f64 = 0.37;
 
