@@ -15,7 +15,8 @@ use pao_sim::surgery::Cut;
 use std::path::PathBuf;
 
 /// Draw a case's fluoroscopy with the true bones' outlines, the landmark and the annotated cuts; for
-/// a registration's key, with the outlines where it put the bones and the pick it began with.
+/// a registration's key, with the outlines where it put the bones, the pick it began with, and where
+/// that put all bones in the first view (`start.png`).
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// The study's folder or its configuration file.
@@ -52,11 +53,12 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let case = worker.simulate(&case_key)?;
     let mut poses = true_poses(&case);
     let mut models = case.fragment.models(Scenario::AllCutsKnown)?;
-    let mut pick = None;
+    let (mut pick, mut start) = (None, None);
     if let Some(key) = &registration {
         let of_key = worker.pick(&case, key);
         let outcome = worker.estimate(&case, key, &of_key)?;
         poses = estimated_poses(&outcome);
+        start = Some([outcome.initial_camera_from_pelvis; 3]);
         models = used_models(&case, key.scenario, &outcome)?;
         pick = Some(of_key);
     }
@@ -69,8 +71,11 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         action: format!("create {}", folder.display()),
         cause,
     })?;
-    for (view, poses) in poses.iter().enumerate() {
-        let path = folder.join(format!("view{}.png", view + 1));
+    let start = start.iter().map(|poses| ("start".to_owned(), 0, poses));
+    let end = poses.iter().enumerate();
+    let end = end.map(|(view, poses)| (format!("view{}", view + 1), view, poses));
+    for (name, view, poses) in start.chain(end) {
+        let path = folder.join(format!("{name}.png"));
         draw(&snapshot, &case, view, poses, &models, pick.as_ref()).write(&path)?;
         say!("{}", path.display());
     }
