@@ -4,34 +4,43 @@ use super::case::{Case, CaseError, CaseParameters, Operation, pelvis_surface};
 use super::movement::Movement;
 use super::pick::PickParameters;
 use crate::anatomy::phantom::{PhantomParameters, phantom};
-use crate::anatomy::{Hip, Landmark, Side};
-use crate::geometry::{Pixel, Rigid, Vector, euler};
+use crate::anatomy::{Hip, Landmark, Side, lce_angle, mirror};
+use crate::geometry::pose_error::PoseError;
+use crate::geometry::{Pixel, Point, Rigid, Vector, euler};
 use crate::surgery::{
-    FragmentParameters, KWireParameters, NominalCutParameters, cut_fragment, nominal_cuts,
+    Cut, FragmentParameters, KWireParameters, NominalCutParameters, cut_fragment, nominal_cuts,
 };
 use crate::xray::{AttenuationParameters, Camera};
 use std::sync::{Arc, OnceLock};
 
-/// The nominal surgery on both hips of a phantom of 2 mm.
-fn operation(side: Side) -> &'static (Arc<Hip>, Operation) {
-    static MADE: OnceLock<[(Arc<Hip>, Operation); 2]> = OnceLock::new();
-    let both = MADE.get_or_init(|| {
+/// The nominal surgery on both hips of a phantom of 2 mm, and on those of its mirror image.
+fn operations() -> &'static [[(Arc<Hip>, Operation); 2]; 2] {
+    static MADE: OnceLock<[[(Arc<Hip>, Operation); 2]; 2]> = OnceLock::new();
+    MADE.get_or_init(|| {
         let coarse = PhantomParameters {
             voxel_mm: 2.0,
             ..Default::default()
         };
-        let specimen = Arc::new(phantom(1, &coarse));
-        Side::BOTH.map(|side| {
-            let hip = Arc::new(Hip::new(Arc::clone(&specimen), side).unwrap());
-            let cuts = nominal_cuts(&hip, &NominalCutParameters::default()).unwrap();
-            let map = cut_fragment(&hip, &cuts, &FragmentParameters::default()).unwrap();
-            let pelvis = Arc::new(pelvis_surface(&hip));
-            let wires = KWireParameters::default();
-            let operation = Operation::new(Arc::clone(&hip), pelvis, map, &wires).unwrap();
-            (hip, operation)
+        let body = phantom(1, &coarse);
+        let reflection = mirror(&body);
+        [body, reflection].map(|specimen| {
+            let specimen = Arc::new(specimen);
+            Side::BOTH.map(|side| {
+                let hip = Arc::new(Hip::new(Arc::clone(&specimen), side).unwrap());
+                let cuts = nominal_cuts(&hip, &NominalCutParameters::default()).unwrap();
+                let map = cut_fragment(&hip, &cuts, &FragmentParameters::default()).unwrap();
+                let pelvis = Arc::new(pelvis_surface(&hip));
+                let wires = KWireParameters::default();
+                let operation = Operation::new(Arc::clone(&hip), pelvis, map, &wires).unwrap();
+                (hip, operation)
+            })
         })
-    });
-    &both[side.index()]
+    })
+}
+
+/// The nominal surgery on a hip of a phantom of 2 mm.
+fn operation(side: Side) -> &'static (Arc<Hip>, Operation) {
+    &operations()[0][side.index()]
 }
 
 fn movement(side: Side) -> Movement {
@@ -189,4 +198,61 @@ fn a_landmark_out_of_the_image_is_an_error_that_says_so() {
         "{error}"
     );
     assert!(error.to_string().contains("MOF_r of p/out"), "{error}");
+}
+
+/// A left hip, and the right hip of the mirror image under the same key: the same surgery, movement,
+/// LCE angle, wires and pictures, mirrored. The C-arm of a right hip is turned by 180 deg, so pictures
+/// are mirrored in their rows.
+#[test]
+fn mirrored_anatomy_gives_the_mirrored_case() {
+    let key = "p/mirror/f00/m00";
+    let [(hip, _), (mirrored_hip, _)] = sides();
+    let simulated = sides().map(|(hip, operation)| {
+        let movement = movement(hip.side);
+        Case::simulate(operation, &movement, &small(), 3, key).unwrap()
+    });
+    let [case, mirrored] = &simulated;
+    let reflected = |v: &Vector| Vector::new(-v.x, v.y, v.z);
+
+    for cut in Cut::ALL {
+        let [plane, other] = [case, mirrored].map(|case| case.truth.cuts.get(cut));
+        assert!((reflected(&plane.normal) - other.normal).norm() < 1e-6);
+    }
+    let size = |case: &(Arc<Hip>, Operation)| case.1.map().fragment_cm3();
+    let [volume, mirrored_volume] = sides().map(size);
+    assert!((volume / mirrored_volume - 1.0).abs() < 1e-3);
+    let lce = |hip: &Hip, movement: &Rigid| {
+        lce_angle(&hip.rim_in_app(), hip.side, movement, &Point::origin()).unwrap()
+    };
+    let angles = [(hip, case), (mirrored_hip, mirrored)]
+        .map(|(hip, case)| lce(hip, &case.truth.movement.fragment));
+    assert!((angles[0] - angles[1]).abs() < 1e-9, "{angles:?}");
+    let errors = [case, mirrored].map(|case| PoseError::of(&case.truth.movement.fragment));
+    assert!((errors[0].rotation_deg - errors[1].rotation_deg).abs() < 1e-9);
+    for (wire, other) in std::iter::zip(&case.truth.wires, &mirrored.truth.wires) {
+        let [tip, other_tip] = [wire.tip_base.coords, other.tip_base.coords];
+        assert!(
+            (reflected(&tip) - other_tip).norm() < 0.5,
+            "{tip} {other_tip}"
+        );
+    }
+    for view in 0..3 {
+        let [image, other] = [case, mirrored].map(|case| &case.counts()[view]);
+        let (mut sum, mut worst) = (0.0, 0.0f64);
+        for (x, y) in (0..192).flat_map(|y| (0..192).map(move |x| (x, y))) {
+            let (a, b) = (f64::from(image.at(x, y)), f64::from(other.at(x, 191 - y)));
+            let deviation = (a - b) / (a + b).max(1.0).sqrt();
+            sum += deviation * deviation;
+            worst = worst.max(deviation.abs());
+        }
+        // Two Poisson draws of one mean: the deviation is nearly a standard normal number.
+        let mean = sum / (192.0 * 192.0);
+        assert!((mean - 1.0).abs() < 0.05, "view {view}: {mean}");
+        assert!(worst < 6.5, "view {view}: {worst}");
+    }
+}
+
+fn sides() -> [&'static (Arc<Hip>, Operation); 2] {
+    let [body, reflection] = operations();
+    [&body[Side::Left.index()], &reflection[Side::Right.index()]]
 }
