@@ -40,8 +40,8 @@ impl BoneDensity {
                         ((q.y - 22.0).powi(2) + (q.z - 42.0).powi(2)).sqrt(),
                     );
                 (
-                    (0.5 + 0.1 * roof + 0.5 * buttress) * uneven,
-                    1100.0,
+                    (0.35 + 0.1 * roof + 0.5 * buttress) * uneven,
+                    1160.0,
                     140.0 + 180.0 * roof,
                 )
             }
@@ -72,7 +72,7 @@ impl BoneDensity {
         // Beneath the cortex bone thins out gradually.
         let inner = smooth_step(cortex - blur, cortex + 3.2 * blur, depth);
         let soft = soft * s.build.density + spongy;
-        let hard = hard + self.shell.at(p, 9.0) * 320.0;
+        let hard = hard + self.shell.at(p, 9.0) * 420.0;
         hard + (soft - hard) * inner
     }
 }
