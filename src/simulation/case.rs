@@ -17,7 +17,7 @@ use crate::surgery::{
     CutPlanes, KWire, KWireError, KWireModel, KWireParameters, SurgeryMap, place_kwires,
 };
 use crate::volume::{Surface, SurfaceParameters};
-use crate::xray::{AttenuationParameters, Camera, Orbit};
+use crate::xray::{AttenuationParameters, BodyVolume, Camera, Orbit};
 use std::sync::Arc;
 
 /// What the cases of one fragment share: the true surgery on one hip.
@@ -148,7 +148,7 @@ pub enum CaseError {
 impl Case {
     /// Simulates the case `key` (`phantom-1/left/f03/m07`, for instance) of the study's `seed`: draws
     /// wires and views, warps the CT, burns in the wires, images it three times, and draws the
-    /// annotations. One copy of the volume lives meanwhile (two while it grows for a wire).
+    /// annotations. At most two copies of the volume live meanwhile.
     ///
     /// # Errors
     /// When a wire finds no place, a landmark is missing, or the landmark is not in the first view.
@@ -196,17 +196,17 @@ impl Case {
             &parameters.attenuation,
             &mut draws(Purpose::MuscleFill),
         );
-        let volume = insert_wires(
+        let body = BodyVolume::new(&insert_wires(
             moved.attenuation,
             &wires,
             &parameters.wire_insertion,
             &parameters.attenuation,
-        );
+        ));
         let of_view =
             |purpose: Purpose, view: usize| stream(seed, purpose, &format!("{key}/{view}"));
         let counts = std::array::from_fn(|view| {
             Arc::new(fluoroscopy(
-                &volume,
+                &body,
                 camera,
                 &views.camera_from_volume[view],
                 &parameters.fluoroscopy,

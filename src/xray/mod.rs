@@ -1,6 +1,7 @@
 //! The X-ray imaging chain: camera, attenuation, projection, image pyramid and photon noise.
 
 pub mod attenuation;
+pub mod body;
 pub mod bone;
 pub mod camera;
 pub mod footprint;
@@ -11,6 +12,7 @@ pub mod reference;
 
 pub use crate::simd::SimdLevel;
 pub use attenuation::AttenuationParameters;
+pub use body::BodyVolume;
 pub use bone::BoneVolume;
 pub use camera::{Camera, Orbit};
 pub use footprint::PixelRect;

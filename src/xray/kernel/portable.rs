@@ -9,7 +9,7 @@ pub(crate) fn project_add(job: &Projection, out: &mut [f32]) {
     for v in job.rect.y0..job.rect.y1 {
         for u in job.rect.x0..job.rect.x1 {
             let sum = ray_sum(job, u, v);
-            out[v * job.width + u] += sum as f32 * job.scale(u, v);
+            out[job.place(u, v)] += sum as f32 * job.scale(u, v);
         }
     }
 }

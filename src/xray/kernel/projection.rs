@@ -15,7 +15,9 @@ pub(crate) struct Projection<'a> {
     pub step_mm: f64,
     pub rect: PixelRect,
     /// Columns of the image.
-    pub width: usize,
+    width: usize,
+    /// The row of the image that the output begins with.
+    first_row: usize,
     /// The last index along each axis, in fixed point.
     pub last: [i32; 3],
     /// How far a sample is shifted right so that the sum of a ray's samples fits 31 bits.
@@ -48,10 +50,22 @@ impl<'a> Projection<'a> {
             step_mm,
             rect,
             width,
+            first_row: 0,
             last: volume.dims.map(|n| ((n - 1) as i32) << BITS),
             shift,
             unit: volume.unit * step_mm as f32 * (1u64 << shift) as f32 / WEIGHT_ONE as f32,
         }
+    }
+
+    /// The same projection for an output that holds the image from this row on.
+    pub fn from_row(self, first_row: usize) -> Self {
+        Self { first_row, ..self }
+    }
+
+    /// The place of a pixel in the output.
+    #[inline(always)]
+    pub fn place(&self, u: usize, v: usize) -> usize {
+        (v - self.first_row) * self.width + u
     }
 
     /// What a pixel's sum of shifted samples is to be multiplied by.
@@ -68,7 +82,7 @@ impl<'a> Projection<'a> {
         for y in v.max(self.rect.y0)..(v + TILE).min(self.rect.y1) {
             for x in u.max(self.rect.x0)..(u + TILE).min(self.rect.x1) {
                 let sum = sums[(y - v) * TILE + x - u];
-                out[y * self.width + x] += sum as f32 * self.scale(x, y);
+                out[self.place(x, y)] += sum as f32 * self.scale(x, y);
             }
         }
     }

@@ -1,7 +1,9 @@
-//! A bone's voxels as the kernels read them.
+//! A volume's voxels as the kernels read them.
 
 use super::occupancy::Occupancy;
-use crate::volume::Volume;
+use crate::volume::{Grid, Volume};
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// Voxels of 15 bits with one scale, and where they are not zero.
 #[derive(Clone, Debug)]
@@ -30,6 +32,48 @@ impl KernelVolume {
     /// When an axis has more than [`Self::LARGEST`] voxels.
     pub fn new(volume: &Volume<f32>) -> Self {
         let dims = volume.grid.dims;
+        let largest = volume.data.iter().fold(0.0f32, |a, &b| a.max(b));
+        let row = |j, k| &volume.data[volume.grid.offset(0, j, k)..][..dims[0]];
+        Self::of_rows(dims, row, |value| value, largest)
+    }
+
+    /// Prepares `part` of the values of the voxels `block` of a volume, none above `largest`, with a
+    /// border of one zero voxel around them. The grid returned is that of the block with its border.
+    ///
+    /// # Panics
+    /// When an axis has more than [`Self::LARGEST`] voxels, border included.
+    pub fn bordered(
+        volume: &Volume<f32>,
+        block: &[Range<usize>; 3],
+        part: impl Fn(f32) -> f32 + Sync,
+        largest: f32,
+    ) -> (Grid, Self) {
+        let [along_i, along_j, along_k] = block;
+        let first = block.each_ref().map(|range| range.start as f64 - 1.0);
+        let grid = Grid {
+            dims: block.each_ref().map(|range| range.len() + 2),
+            origin: volume.grid.point(first[0], first[1], first[2]),
+            ..volume.grid.clone()
+        };
+        let inside = |n: usize, range: &Range<usize>| (1..=range.len()).contains(&n);
+        let row = |j: usize, k: usize| {
+            if !inside(j, along_j) || !inside(k, along_k) {
+                return &[][..];
+            }
+            let (j, k) = (along_j.start + j - 1, along_k.start + k - 1);
+            &volume.data[volume.grid.offset(along_i.start, j, k)..][..along_i.len()]
+        };
+        let kernel = Self::of_rows(grid.dims, row, part, largest);
+        (grid, kernel)
+    }
+
+    /// Of rows along i, of which a zero border may be left out, or everything.
+    fn of_rows<'a>(
+        dims: [usize; 3],
+        row: impl Fn(usize, usize) -> &'a [f32] + Sync,
+        part: impl Fn(f32) -> f32 + Sync,
+        largest: f32,
+    ) -> Self {
         assert!(
             dims.iter().all(|&n| n <= Self::LARGEST),
             "a bone of {dims:?} voxels cannot be projected; expected at most {} along an axis: \
@@ -37,21 +81,25 @@ impl KernelVolume {
             Self::LARGEST
         );
         let [nx, ny, nz] = dims;
-        let largest = volume.data.iter().fold(0.0f32, |a, &b| a.max(b));
         let per_unit = FULL_SCALE / largest;
         let mut pairs = vec![[0i16; 2]; nx * ny * (nz + 1) + 2];
-        for k in 0..nz {
-            for j in 0..ny {
-                let row = volume.grid.offset(0, j, k);
-                for i in 0..nx {
-                    let value = (volume.data[row + i] * per_unit).round() as i16;
-                    pairs[row + i][0] = value;
-                    if j > 0 {
-                        pairs[row + i - nx][1] = value;
+        pairs
+            .par_chunks_exact_mut(nx * ny)
+            .take(nz)
+            .enumerate()
+            .for_each(|(k, slice)| {
+                for j in 0..ny {
+                    let values = row(j, k);
+                    let at = j * nx + (nx - values.len()) / 2;
+                    for (i, &value) in values.iter().enumerate() {
+                        let value = (part(value) * per_unit).round() as i16;
+                        slice[at + i][0] = value;
+                        if j > 0 {
+                            slice[at + i - nx][1] = value;
+                        }
                     }
                 }
-            }
-        }
+            });
         Self {
             occupancy: Occupancy::new(dims, &pairs),
             dims,
