@@ -6,8 +6,9 @@
 //! the meantime.
 
 use super::Projection;
-use super::fixed::{BITS, CHUNK, TILE, TileRays, WEIGHT_BITS, WEIGHT_ONE};
+use super::fixed::{BITS, CHUNK, TileRays, WEIGHT_BITS, WEIGHT_ONE};
 use super::occupancy::Occupancy;
+use super::tile::Tiles;
 use std::arch::x86_64::*;
 use std::cell::RefCell;
 
@@ -16,18 +17,15 @@ use std::cell::RefCell;
 #[target_feature(enable = "avx2,avx512f,avx512bw,avx512dq,avx512vl")]
 pub(crate) fn project_add(job: &Projection, out: &mut [f32]) {
     TILES.with_borrow_mut(|[next, current]| {
-        let rect = &job.rect;
         let call = Call::new(job);
         current.runs.clear();
-        for v in (rect.y0 - rect.y0 % TILE..rect.y1).step_by(TILE) {
-            for u in (rect.x0 - rect.x0 % TILE..rect.x1).step_by(TILE) {
-                call.find_samples(u, v, next);
-                if next.runs.is_empty() {
-                    continue;
-                }
-                call.add_tile(current, out);
-                std::mem::swap(next, current);
+        for (u, v) in call.tiles.first_pixels() {
+            call.find_samples(u, v, next);
+            if next.runs.is_empty() {
+                continue;
             }
+            call.add_tile(current, out);
+            std::mem::swap(next, current);
         }
         call.add_tile(current, out);
     });
@@ -69,6 +67,7 @@ struct Positions {
 /// One projection with what is the same for all of its tiles.
 struct Call<'a> {
     job: &'a Projection<'a>,
+    tiles: Tiles<'a>,
     /// Column and row of each lane in its tile.
     column: __m512i,
     row: __m512i,
@@ -77,16 +76,8 @@ struct Call<'a> {
     /// Voxels of a row and of a slice.
     row_voxels: __m512i,
     slice_voxels: __m512i,
-    /// The rays of a tile lie at most this many voxels from its centre, per mm of depth, and
-    /// anywhere in the volume.
-    radius_per_mm: f64,
-    radius: f64,
-    step_offsets: ([i32; 3], [i32; 3]),
     prefetch: Prefetch,
 }
-
-/// More voxels than positions in fixed point can be off.
-const ROUNDING: f64 = 0.01;
 
 /// Which voxels are asked for ahead of time: a few lanes whose cache lines hold most of what all
 /// of them need.
@@ -102,18 +93,14 @@ impl<'a> Call<'a> {
     #[target_feature(enable = "avx2,avx512f,avx512bw,avx512dq,avx512vl")]
     fn new(job: &'a Projection<'a>) -> Self {
         let [nx, ny, _] = job.volume.dims;
-        let half = (TILE as f64 - 1.0) / 2.0;
-        let radius_per_mm = (job.rays.column.abs() + job.rays.row.abs()).max() * half;
         Self {
             job,
+            tiles: Tiles::new(job),
             column: _mm512_setr_epi32(0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3),
             row: _mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3),
             last: all(job.last),
             row_voxels: _mm512_set1_epi32(nx as i32),
             slice_voxels: _mm512_set1_epi32((nx * ny) as i32),
-            radius_per_mm,
-            radius: radius_per_mm * job.farthest_mm + ROUNDING,
-            step_offsets: job.fixed.step_offsets(),
             prefetch: Prefetch::new(job),
         }
     }
@@ -123,52 +110,21 @@ impl<'a> Call<'a> {
     fn find_samples(&self, u: usize, v: usize, tile: &mut Tile) {
         let job = self.job;
         tile.runs.clear();
-        let half = (TILE as f64 - 1.0) / 2.0;
-        let slope =
-            job.rays.axis + job.rays.column * (u as f64 + half) + job.rays.row * (v as f64 + half);
-        let Some((first, end)) = job.samples(slope, self.radius) else {
+        let Some(span) = self.tiles.span(u, v) else {
             return;
         };
-        (tile.u, tile.v) = (u, v);
-        tile.rays = job.fixed.tile(u, v);
+        (tile.u, tile.v, tile.rays) = (u, v, span.rays);
         let step = self.step(&tile.rays);
-        let (column, row) = self.step_offsets;
-        let center_step = center(tile.rays.step(), column, row);
-        let fastest = center_step.iter().map(|s| s.unsigned_abs()).max();
-        let chunks_per_voxel = (1u32 << BITS) as f32 / (fastest.unwrap_or(1) * CHUNK) as f32;
         let mut count = 0;
-        let mut chunk = first / CHUNK;
-        while chunk * CHUNK < end {
-            let (column, row) = job.fixed.offsets(chunk);
-            let start = tile.rays.start(chunk);
-            let clearances = clearances(job, center(start, column, row), center_step);
-            // A ray may meet something where it is farther from the centre than the centre's cell
-            // can grow less one voxel.
-            let depth = f64::from((chunk + 1) * CHUNK) * job.step_mm;
-            let radius = (self.radius_per_mm * depth + ROUNDING).min(self.radius);
-            let mut mask = u32::from(_mm512_cmple_epu32_mask(
-                clearances,
-                _mm512_set1_epi32(radius.ceil() as i32),
-            ));
-            mask &= samples_from(first.saturating_sub(chunk * CHUNK))
-                & !samples_from(end - chunk * CHUNK);
-            if mask == 0 {
-                // The last sample's clearance tells how many more are far from everything.
-                let last = _mm_extract_epi32::<3>(_mm512_extracti32x4_epi32::<3>(clearances));
-                let free = last as f32 - 1.0 - radius as f32;
-                chunk += 1 + (free.max(0.0) * chunks_per_voxel) as u32;
-                continue;
-            }
-            let start = self.lanes(start, column, row);
+        let near = |start, step, radius| clearances(job, start, step, radius);
+        self.tiles.for_each_chunk(&span, near, |chunk| {
+            let start = self.lanes(chunk.start, chunk.offsets);
             if tile.places.len() < count + CHUNK as usize {
                 tile.places.resize(2 * count + CHUNK as usize, [0; 16]);
             }
-            while mask != 0 {
-                let first = mask.trailing_zeros();
-                let run = (mask >> first).trailing_ones();
-                mask &= samples_from(first + run);
+            for (first, run) in chunk.runs() {
                 tile.runs.push(Run {
-                    chunk,
+                    chunk: chunk.number,
                     first,
                     count: run,
                 });
@@ -184,8 +140,7 @@ impl<'a> Call<'a> {
                 }
                 count += run as usize;
             }
-            chunk += 1;
-        }
+        });
     }
 
     /// Second pass: adds the line integrals of a tile's pixels to `out`.
@@ -200,8 +155,7 @@ impl<'a> Call<'a> {
         let mut sums = _mm512_setzero_si512();
         let mut places = tile.places.iter();
         for run in &tile.runs {
-            let (column, row) = job.fixed.offsets(run.chunk);
-            let start = self.lanes(tile.rays.start(run.chunk), column, row);
+            let start = self.lanes(tile.rays.start(run.chunk), job.fixed.offsets(run.chunk));
             let mut at = ahead(start, step, run.first);
             for (_, places) in (0..run.count).zip(&mut places) {
                 let negative = negative_samples(job, places, at);
@@ -219,14 +173,13 @@ impl<'a> Call<'a> {
     #[inline]
     #[target_feature(enable = "avx512f")]
     fn step(&self, rays: &TileRays) -> Positions {
-        let (column, row) = self.step_offsets;
-        self.lanes(rays.step(), column, row)
+        self.lanes(rays.step(), self.tiles.step_offsets)
     }
 
     /// Values of all lanes from that of the first and what columns and rows add.
     #[inline]
     #[target_feature(enable = "avx512f")]
-    fn lanes(&self, first: [i32; 3], column: [i32; 3], row: [i32; 3]) -> Positions {
+    fn lanes(&self, first: [i32; 3], (column, row): ([i32; 3], [i32; 3])) -> Positions {
         let one = |a: usize| {
             let columns = _mm512_mullo_epi32(self.column, _mm512_set1_epi32(column[a]));
             let rows = _mm512_mullo_epi32(self.row, _mm512_set1_epi32(row[a]));
@@ -332,29 +285,11 @@ fn ahead(start: Positions, step: Positions, count: u32) -> Positions {
     sum(start, steps)
 }
 
-/// The value at a tile's centre, of which no lane has a ray.
-#[inline(always)]
-fn center(first: [i32; 3], column: [i32; 3], row: [i32; 3]) -> [i32; 3] {
-    std::array::from_fn(|a| {
-        let diagonal = column[a].wrapping_add(row[a]);
-        first[a].wrapping_add(diagonal.wrapping_mul(TILE as i32 - 1) / 2)
-    })
-}
-
-/// A mask of the samples of a chunk from number `first` on.
-#[inline(always)]
-fn samples_from(first: u32) -> u32 {
-    if first >= CHUNK {
-        0
-    } else {
-        0xffff << first & 0xffff
-    }
-}
-
-/// The clearances of the cells of a chunk's 16 samples, on the ray that begins at `start`.
+/// Which of a chunk's 16 samples, on the ray that begins at `start`, lie in cells whose clearance is
+/// at most `radius`, and the clearance of the last.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
-fn clearances(job: &Projection, start: [i32; 3], step: [i32; 3]) -> __m512i {
+fn clearances(job: &Projection, start: [i32; 3], step: [i32; 3], radius: u32) -> (u32, u8) {
     const SHIFT: u32 = BITS + Occupancy::SHIFT;
     let number = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
     let cells = job.volume.occupancy.dims;
@@ -372,7 +307,10 @@ fn clearances(job: &Projection, start: [i32; 3], step: [i32; 3]) -> __m512i {
     // SAFETY: each number is that of a cell of the table, which has three bytes more than its
     // cells for the four that are loaded from each.
     let loaded = unsafe { _mm512_i32gather_epi32::<1>(at, table.as_ptr().cast()) };
-    _mm512_and_si512(loaded, _mm512_set1_epi32(0xff))
+    let clearances = _mm512_and_si512(loaded, _mm512_set1_epi32(0xff));
+    let near = _mm512_cmple_epu32_mask(clearances, _mm512_set1_epi32(radius as i32));
+    let last = _mm_extract_epi32::<3>(_mm512_extracti32x4_epi32::<3>(clearances));
+    (u32::from(near), last as u8)
 }
 
 /// The interpolated volume at 16 positions, whose voxels are at `places`, in units of the voxels

@@ -105,6 +105,9 @@ impl<'a> Projection<'a> {
             #[cfg(target_arch = "x86_64")]
             // SAFETY: a level above portable is only given where the processor has it.
             SimdLevel::Avx512 => unsafe { super::avx512::project_add(self, out) },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: as above.
+            SimdLevel::Avx2 => unsafe { super::avx2::project_add(self, out) },
             _ => super::portable::project_add(self, out),
         }
     }
