@@ -25,6 +25,21 @@ impl Rod {
         Self { nodes, flat: None }
     }
 
+    /// The corners (lowest, highest) of the box in the frame's axes that holds all that is nearer
+    /// than `margin` mm to a rod that is not widened.
+    pub fn bounds(&self, margin: f64) -> [Point; 2] {
+        let mut bounds = [
+            Point::from([f64::INFINITY; 3]),
+            Point::from([f64::NEG_INFINITY; 3]),
+        ];
+        for node in &self.nodes {
+            let reach = Vector::repeat(node.radius + margin);
+            bounds[0] = bounds[0].inf(&(node.center - reach));
+            bounds[1] = bounds[1].sup(&(node.center + reach));
+        }
+        bounds
+    }
+
     /// A rod whose section is an ellipse: wider by `ratio` (>= 1) along the unit vector `axis`
     /// than across it, where it keeps its radius.
     pub fn widened(nodes: Vec<Node>, axis: Vector, ratio: f64) -> Self {

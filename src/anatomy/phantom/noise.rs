@@ -19,6 +19,13 @@ fn scrambled(mut x: u64) -> u64 {
     x ^ (x >> 31)
 }
 
+/// `f64::floor`, which is a call into the maths library on processors that are not asked for by name.
+#[inline]
+fn floor(x: f64) -> i64 {
+    let i = x as i64;
+    i - i64::from((i as f64) > x)
+}
+
 impl Noise {
     pub fn new(stream: &mut Stream) -> Self {
         Self {
@@ -45,12 +52,12 @@ impl Noise {
     #[inline]
     pub fn stretched(&self, p: &Point, size_mm: [f64; 3]) -> f64 {
         let q: [f64; 3] = std::array::from_fn(|a| p[a] / size_mm[a]);
-        let base = q.map(f64::floor);
+        let base = q.map(floor);
         let f: [f64; 3] = std::array::from_fn(|a| {
-            let t = q[a] - base[a];
+            let t = q[a] - base[a] as f64;
             t * t * (3.0 - 2.0 * t)
         });
-        let [i, j, k] = base.map(|b| b as i64);
+        let [i, j, k] = base;
         let mut sum = 0.0;
         for dk in 0..2 {
             for dj in 0..2 {

@@ -11,6 +11,8 @@ use rand::RngExt;
 const AIR_HU: f64 = -1000.0;
 const FAT_HU: f64 = -116.0;
 const MUSCLE_HU: f64 = 31.0;
+/// Fat around a vessel.
+const SHEATH_MM: f64 = 3.0;
 
 /// Torso: (z above the heads, half width, half depth) in mm; y of its middle is fixed.
 const TORSO: [[f64; 3]; 6] = [
@@ -60,7 +62,8 @@ pub(super) struct SoftTissue {
     fat: f64,
     thighs: [[Point; 2]; 2],
     iliopsoas: Vec<Rod>,
-    vessels: Vec<Rod>,
+    /// With the box outside of which a vessel and its sheath cannot be.
+    vessels: Vec<([Point; 2], Rod)>,
     bladder: Ellipsoid,
     organ: Ellipsoid,
     rectum: Rod,
@@ -142,7 +145,11 @@ impl SoftTissue {
             fat: build.fat,
             thighs,
             iliopsoas: iliopsoas.into(),
-            vessels: vessels.into_iter().chain(veins).collect(),
+            vessels: vessels
+                .into_iter()
+                .chain(veins)
+                .map(|rod| (rod.bounds(SHEATH_MM), rod))
+                .collect(),
             bladder,
             organ,
             rectum,
@@ -207,19 +214,17 @@ impl SoftTissue {
         d
     }
 
-    /// HU without bone at a world point whose place in the pelvic frame is `p`; `hip` and `spine`
-    /// are the distances to the nearer hip bone or sacrum, and to the vertebrae.
-    pub fn hu(&self, skeleton: &Skeleton, world: &Point, p: &Point, hip: f64) -> f64 {
-        let skin = self.skin(world);
+    /// HU without bone at a world point whose place in the pelvic frame is `p`; `hip` is the
+    /// distance to the nearer hip bone or sacrum, `skin` that of [`Self::skin`].
+    pub fn hu(&self, s: &Skeleton, world: &Point, p: &Point, hip: f64, skin: f64) -> f64 {
         if skin > 1.5 {
             return AIR_HU;
         }
-        let inside = self.under_the_skin(skeleton, world, p, hip, skin);
+        let inside = self.under_the_skin(s, world, p, hip, skin);
         inside + (AIR_HU - inside) * smooth_step(-0.8, 0.8, skin)
     }
 
     fn under_the_skin(&self, s: &Skeleton, world: &Point, p: &Point, hip: f64, skin: f64) -> f64 {
-        let fat = FAT_HU + 9.0 * self.folds.at(world, 6.0) + 6.0 * self.grain.at(world, 2.5);
         if skin > -2.2 {
             return 25.0 + 20.0 * self.grain.at(world, 3.0);
         }
@@ -236,26 +241,33 @@ impl SoftTissue {
         if muscle_edge > 0.0 {
             // Fine septa run through subcutaneous fat.
             let septum = 1.0 - smooth_step(0.02, 0.06, self.folds.at(world, 16.0).abs());
-            return fat + 35.0 * septum;
+            return self.fat_hu(world) + 35.0 * septum;
         }
         let column = if p.z > 80.0 { s.spine.column(p) } else { 40.0 };
         if column < 0.0 {
             return 75.0 + 15.0 * self.grain.at(world, 3.0);
         }
-        for vessel in &self.vessels {
+        for ([low, high], vessel) in &self.vessels {
+            if (0..3).any(|a| p[a] < low[a] || p[a] > high[a]) {
+                continue;
+            }
             let d = vessel.distance(p);
-            if d < 3.0 {
-                return 46.0 + (fat - 46.0) * smooth_step(-0.5, 1.0, d);
+            if d < SHEATH_MM {
+                return 46.0 + (self.fat_hu(world) - 46.0) * smooth_step(-0.5, 1.0, d);
             }
         }
         let cavity = self.cavity(p, hip, column);
         if cavity < 0.0 {
-            return self.organs(world, p, fat, -cavity);
+            return self.organs(world, p, -cavity);
         }
-        self.muscle(world, fat, hip, cavity, muscle_edge)
+        self.muscle(world, hip, cavity, muscle_edge)
     }
 
-    fn muscle(&self, world: &Point, fat: f64, hip: f64, cavity: f64, edge: f64) -> f64 {
+    fn fat_hu(&self, world: &Point) -> f64 {
+        FAT_HU + 9.0 * self.folds.at(world, 6.0) + 6.0 * self.grain.at(world, 2.5)
+    }
+
+    fn muscle(&self, world: &Point, hip: f64, cavity: f64, edge: f64) -> f64 {
         // Planes of fat between muscles: level sets of a field that runs along the body and, near
         // the ilium, parallel to the bone as the gluteal muscles do.
         let turned = Point::new(
@@ -273,11 +285,15 @@ impl SoftTissue {
         let lean = MUSCLE_HU + 9.0 * self.folds.at(world, 24.0) + 12.0 * self.grain.at(world, 3.5);
         // Fascia lets no fat stripes end at the skin side or at the peritoneum.
         let sheath = smooth_step(0.0, 3.0, cavity.min(-edge));
-        lean + (fat - lean) * (septum * sheath).max(0.55 * marbling)
+        let share = (septum * sheath).max(0.55 * marbling);
+        if share == 0.0 {
+            return lean;
+        }
+        lean + (self.fat_hu(world) - lean) * share
     }
 
     /// `deep` is the depth in the cavity in mm.
-    fn organs(&self, world: &Point, p: &Point, fat: f64, deep: f64) -> f64 {
+    fn organs(&self, world: &Point, p: &Point, deep: f64) -> f64 {
         let wall = 38.0 + 10.0 * self.grain.at(world, 3.0);
         let bladder = self.bladder.distance(p);
         if bladder < 0.0 {
@@ -298,7 +314,7 @@ impl SoftTissue {
             return 45.0 + 10.0 * self.grain.at(world, 4.0);
         }
         if p.z < 18.0 {
-            return fat;
+            return self.fat_hu(world);
         }
         // Loops with fat between them along the level set of a bent field.
         let bend = Vector::new(
@@ -308,6 +324,7 @@ impl SoftTissue {
         );
         let field = self.bowel.at(&(world + bend * 9.0), 33.0);
         let loops = field.abs() - 0.06;
+        let fat = self.fat_hu(world);
         if loops < 0.0 {
             return fat;
         }

@@ -126,7 +126,8 @@ fn fill(
                     let p = pelvis_from_world * world;
                     let mut nearest = (f64::INFINITY, Bone::Spine);
                     let mut hip = f64::INFINITY;
-                    if soft.skin(&world) < 0.0 {
+                    let skin = soft.skin(&world);
+                    if skin < 0.0 {
                         for candidate in Bone::ALL {
                             let d = skeleton.distance(candidate, &p);
                             if d < nearest.0 {
@@ -141,7 +142,7 @@ fn fill(
                     let around = if d < -blur {
                         0.0
                     } else {
-                        soft.hu(skeleton, &world, &p, hip)
+                        soft.hu(skeleton, &world, &p, hip, skin)
                     };
                     let hu = if d < blur {
                         let b = bone.hu(skeleton, which, &p, -d, blur);
