@@ -2,8 +2,8 @@
 
 use super::observation::BoneModels;
 use crate::anatomy::{Hip, Label};
-use crate::surgery::CutPlanes;
-use crate::surgery::fragment::{FragmentError, FragmentParameters, carve, cut_fragment};
+use crate::surgery::fragment::{FragmentError, FragmentParameters, cut_fragment};
+use crate::surgery::{Acetabulum, CutPlanes, PlausibilityParameters, plausible_estimate};
 use crate::volume::Volume;
 use crate::xray::{AttenuationParameters, BoneVolume};
 use std::sync::Arc;
@@ -15,6 +15,8 @@ pub struct ModelRecipe {
     pub attenuation: AttenuationParameters,
     /// How cuts become a label map.
     pub fragment: FragmentParameters,
+    /// Rules for the fragments of estimated cuts.
+    pub plausibility: PlausibilityParameters,
 }
 
 /// A model that cannot be made.
@@ -49,10 +51,13 @@ impl ModelRecipe {
         })
     }
 
-    /// Whether cuts free a fragment at all, or why not.
+    /// Whether cuts, of which some are estimated, free a fragment that can be one
+    /// ([`plausible_estimate`]), or why not.
     pub fn plausible(&self, hip: &Hip, cuts: &CutPlanes) -> Result<(), String> {
-        match carve(hip, cuts, &self.fragment) {
-            Ok(_) => Ok(()),
+        let acetabulum = Acetabulum::of(hip).map_err(|error| error.to_string())?;
+        match plausible_estimate(hip, &acetabulum, cuts, &self.fragment, &self.plausibility) {
+            Ok(Ok(_)) => Ok(()),
+            Ok(Err(rejection)) => Err(rejection.to_string()),
             Err(error) => Err(error.to_string()),
         }
     }

@@ -73,7 +73,7 @@ fn fit(
     let points = cut_points(input.pelvis, input.views, input.annotations, cut);
     let kept = prune(&points, input.hip, midline_x(input.hip), cut);
     let fitted = ransac_plane(&kept, parameters, stream)
-        .map_err(|error| format!("{error} (rays met the pelvis in {} points)", points.len()))?;
+        .map_err(|error| format!("{error} (of {} before pruning)", points.len()))?;
     let plane = fitted.plane.transformed(&input.hip.app_from_volume);
     // The femoral head, the APP's origin, lies inside.
     let outward = match plane.signed_distance(&Point::origin()) > 0.0 {
@@ -243,7 +243,7 @@ mod tests {
                 estimated
                     .pubis_fallback
                     .unwrap()
-                    .starts_with("0 points are left")
+                    .starts_with("0 sightings are left")
             );
             assert_eq!(estimated.cuts.get(Cut::Pubis), nominal.get(Cut::Pubis));
         }

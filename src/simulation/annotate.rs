@@ -112,6 +112,13 @@ impl<'a> CutLines<'a> {
         lines
     }
 
+    /// Points of the true line of the ilium or pubis cut, at most 0.1 mm apart along it, in the world;
+    /// none for the other cuts, which nobody annotates.
+    pub fn points(&self, cut: Cut) -> &[Point] {
+        let place = ANNOTATED.iter().position(|&annotated| annotated == cut);
+        place.map_or(&[], |place| &self.points[place])
+    }
+
     /// A person's annotations of the ilium and pubis cuts in one view.
     ///
     /// Every pixel of the full image that the true line (the cut's plane where it meets the pelvis

@@ -153,6 +153,23 @@ fn without_annotations_of_a_cut_the_plan_is_used_and_the_reason_given() {
     let result = estimate(&scene, &only_ilium);
     assert_eq!(result.ilium_fallback, None);
     let reason = result.pubis_fallback.unwrap();
-    assert!(reason.starts_with("0 points are left"), "{reason}");
+    assert!(reason.starts_with("0 sightings are left"), "{reason}");
     assert_eq!(result.cuts.get(Cut::Pubis), scene.nominal.get(Cut::Pubis));
+}
+
+#[test]
+fn a_plane_through_the_joint_is_refused() {
+    let mut scene = scene(Side::Left);
+    // Lines drawn through the acetabulum's roof: nothing but the joint says that they are wrong.
+    let roof = Plane::through(&Point::new(0.0, 27.5, 0.0), &Vector::y());
+    scene.truth = scene.truth.with(Cut::Ilium, roof);
+    let result = estimate(
+        &scene,
+        &annotations(&scene, &AnnotationParameters::default()),
+    );
+    let reason = result
+        .ilium_fallback
+        .expect("the cut runs through the joint");
+    assert!(reason.contains("ilium cut too close"), "{reason}");
+    assert_eq!(result.cuts.get(Cut::Ilium), scene.nominal.get(Cut::Ilium));
 }

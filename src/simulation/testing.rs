@@ -16,6 +16,7 @@ pub fn landmarks() -> Landmarks {
         l.set(Landmark::Ips, side, Point::new(5.0 * s, -60.0, -40.0));
         l.set(Landmark::Fh, side, Point::new(88.0 * s, -10.0, 0.0));
         l.set(Landmark::Mof, side, Point::new(38.0 * s, -35.0, -38.0));
+        l.set(Landmark::Gsn, side, Point::new(70.0 * s, 48.0, 25.0));
     }
     l
 }

@@ -135,6 +135,7 @@ impl Preparation {
             recipe: ModelRecipe {
                 attenuation: self.config.xray.attenuation.clone(),
                 fragment: surgery.fragment.clone(),
+                plausibility: surgery.plausibility.clone(),
             },
             femur: OnceLock::new(),
             full_pelvis: OnceLock::new(),

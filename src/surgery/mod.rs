@@ -25,7 +25,7 @@ pub use fragment::{FragmentError, FragmentParameters, SurgeryMap, cut_fragment};
 pub use insertion_zone::ZoneParameters;
 pub use kwire::{KWire, KWireError, KWireModel, KWireParameters, place_kwires};
 pub use nominal_cuts::{NominalCutError, NominalCutParameters, nominal_cuts};
-pub use plausibility::{PlausibilityParameters, Rejection, plausible_fragment};
+pub use plausibility::{PlausibilityParameters, Rejection, plausible_estimate, plausible_fragment};
 pub use posterior_column::PosteriorColumn;
 pub use random_cuts::{CutPivots, RandomCutParameters, random_cuts};
 pub use sampling::{FragmentSamplingParameters, RejectionCounts, SampleError, sample_fragment};

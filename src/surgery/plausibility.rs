@@ -137,6 +137,45 @@ pub fn plausible_fragment(
     if let Some(rejection) = check_planes(hip, &site.acetabulum, cuts, rules) {
         return Ok(Err(rejection));
     }
+    let carving = match carve_whole_joint(hip, &site.acetabulum, cuts, fragment, rules)? {
+        Ok(carving) => carving,
+        Err(rejection) => return Ok(Err(rejection)),
+    };
+    if !column_holds(hip, site, cuts, &carving, rules.column_mm)? {
+        return Ok(Err(Rejection::RingBroken));
+    }
+    Ok(Ok(carving))
+}
+
+/// Carves the fragment of cuts of which some are estimated, and holds it to the rules that an
+/// estimate can keep. It is off by a millimetre or two, so its cuts may come as close to the joint as
+/// they like, but not run through it. Nor must landmarks lie outside: a true pubis cut and a planned
+/// ischium cut may enclose IOF without freeing the bone there. The ring is the planned posterior
+/// cut's matter.
+///
+/// # Errors
+/// When an ASIS is missing (not when the fragment is implausible).
+pub fn plausible_estimate(
+    hip: &Hip,
+    acetabulum: &Acetabulum,
+    cuts: &CutPlanes,
+    fragment: &FragmentParameters,
+    rules: &PlausibilityParameters,
+) -> Result<Result<Carving, Rejection>, FrameError> {
+    if let Some(cut) = too_close(acetabulum, cuts, 0.0) {
+        return Ok(Err(Rejection::TooClose(cut)));
+    }
+    carve_whole_joint(hip, acetabulum, cuts, fragment, rules)
+}
+
+/// Carves the fragment and holds it to the rules on the bone itself.
+fn carve_whole_joint(
+    hip: &Hip,
+    acetabulum: &Acetabulum,
+    cuts: &CutPlanes,
+    fragment: &FragmentParameters,
+    rules: &PlausibilityParameters,
+) -> Result<Result<Carving, Rejection>, FrameError> {
     let carving = match carve(hip, cuts, fragment) {
         Ok(carving) => carving,
         Err(FragmentError::Frame(error)) => return Err(error),
@@ -147,14 +186,14 @@ pub fn plausible_fragment(
             return Ok(Err(Rejection::NoBone));
         }
     };
-    let rejection = check_bone(hip, &site.acetabulum, &carving, fragment, rules)?;
-    let rejection = match rejection {
-        None if !column_holds(hip, site, cuts, &carving, rules.column_mm)? => {
-            Some(Rejection::RingBroken)
-        }
-        other => other,
-    };
+    let rejection = check_bone(hip, acetabulum, &carving, fragment, rules)?;
     Ok(rejection.map_or(Ok(carving), Err))
+}
+
+/// A cut that comes closer to the rim or the articular surface than `clearance_mm`.
+fn too_close(acetabulum: &Acetabulum, cuts: &CutPlanes, clearance_mm: f64) -> Option<Cut> {
+    let close = |cut: &Cut| acetabulum.clearance_mm(cuts.get(*cut)) < clearance_mm;
+    Cut::ALL.into_iter().find(close)
 }
 
 /// The rules that need the planes only.
@@ -164,10 +203,8 @@ fn check_planes(
     cuts: &CutPlanes,
     rules: &PlausibilityParameters,
 ) -> Option<Rejection> {
-    for cut in Cut::ALL {
-        if acetabulum.clearance_mm(cuts.get(cut)) < rules.clearance_mm {
-            return Some(Rejection::TooClose(cut));
-        }
+    if let Some(cut) = too_close(acetabulum, cuts, rules.clearance_mm) {
+        return Some(Rejection::TooClose(cut));
     }
     for landmark in KEPT_LANDMARKS {
         let Some(p) = hip.specimen.landmarks.get(landmark, hip.side) else {
