@@ -7,5 +7,6 @@ mod pipeline;
 mod single_view;
 mod views;
 
+pub use initialization::from_single_landmark;
 pub use parameters::{MultiViewParameters, PaperParameters, SingleViewParameters};
 pub use pipeline::Paper;

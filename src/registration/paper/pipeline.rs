@@ -64,7 +64,13 @@ impl Strategy for Paper {
         };
         let mut stages = Vec::new();
         let views = PreparedViews::new(&observation.views, paper).map_err(failed("preparation"))?;
-        let initial = from_single_landmark(observation, paper.landmark_depth);
+        let initial = from_single_landmark(
+            &observation.hip,
+            &observation.views[0].camera,
+            &observation.picked_point,
+            &observation.picked_pixel,
+            paper.landmark_depth,
+        );
 
         let (single_view, orbital_angles) =
             self.register_single_views(observation, &views, initial, &optimizer, &mut stages)?;
