@@ -1,7 +1,7 @@
 //! The arguments, and which subcommand they go to.
 
 use super::error::{Exit, Failure};
-use super::{plan, replay, report, run, show, status};
+use super::{plan, replay, report, run, show, specimen, status};
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -45,6 +45,8 @@ enum Command {
     Replay(replay::Arguments),
     /// Draw a case, or what a registration made of it.
     Show(show::Arguments),
+    /// Make, show and check specimens.
+    Specimen(specimen::Arguments),
 }
 
 /// Parses the command line and does what it says.
@@ -58,6 +60,7 @@ pub fn main() -> ExitCode {
         Command::Report(own) => report::main(own, common),
         Command::Replay(own) => replay::main(own, common),
         Command::Show(own) => show::main(own, common),
+        Command::Specimen(own) => specimen::main(own, common),
     };
     match result {
         Ok(exit) => exit.into(),

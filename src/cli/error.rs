@@ -31,6 +31,10 @@ pub enum Failure {
     Report(#[from] pao_sim::report::ReportError),
     #[error(transparent)]
     Picture(#[from] pao_sim::report::PictureError),
+    #[error(transparent)]
+    Specimen(#[from] pao_sim::anatomy::SpecimenError),
+    #[error(transparent)]
+    Import(#[from] pao_sim::anatomy::surfaces::ImportError),
     #[error("{phase}: {message}", phase = .0.phase, message = .0.message)]
     Work(pao_sim::study::Failure),
     #[error("the study has no registration or case {0}; `pao-sim plan` tells what it consists of")]

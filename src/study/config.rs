@@ -22,7 +22,7 @@ use nalgebra::Unit;
 use serde::de::{self, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A whole study.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -78,10 +78,11 @@ pub struct PopulationSection {
     /// is named `phantom-1`). Default 6.
     #[serde(deserialize_with = "numbers")]
     pub phantoms: Vec<u32>,
-    /// Folders of specimens (`pao-sim specimen import` writes them). Default none.
+    /// Folders of specimens (`pao-sim specimen import` writes them); relative paths start at the
+    /// configuration's folder. Default none.
     pub specimens: Vec<PathBuf>,
     /// Folders of closed bone surfaces (PLY, RAS, mm), each made into a specimen when it is first
-    /// needed. They carry no density: it is assigned by rule. Default none.
+    /// needed; relative paths as above. They carry no density: it is assigned by rule. Default none.
     pub surfaces: Vec<PathBuf>,
     /// Sides that are operated on. Default both.
     pub sides: Vec<Side>,
@@ -135,6 +136,16 @@ impl PopulationSection {
         let folders = self.specimens.iter().cloned().map(SpecimenSource::Folder);
         let surfaces = self.surfaces.iter().cloned().map(SpecimenSource::Surfaces);
         phantoms.chain(folders).chain(surfaces).collect()
+    }
+
+    /// Makes every path absolute; relative ones start at the folder of the configuration `file`.
+    pub(super) fn resolve_paths(&mut self, file: &Path) {
+        let folder = file.parent().unwrap_or(Path::new(""));
+        for path in self.specimens.iter_mut().chain(&mut self.surfaces) {
+            let whole = folder.join(&*path);
+            // Without a working directory the path stays as it is, and reading it tells.
+            *path = std::path::absolute(&whole).unwrap_or(whole);
+        }
     }
 }
 

@@ -28,7 +28,8 @@ impl Config {
         Self::parse(&text, file, &|name| std::env::var(name).ok())
     }
 
-    /// The same for a text; `file` gives messages and the study's default name.
+    /// The same for a text; `file` gives messages, the study's default name, and the folder that
+    /// relative paths start from.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -46,7 +47,8 @@ impl Config {
             let mut document = document.into_inner();
             source.expand(&mut document, environment);
             let whole = document.clone();
-            let config = source.config(document, file);
+            let mut config = source.config(document, file);
+            config.population.resolve_paths(file);
             for (path, problem) in config.problems() {
                 let span = span_of(&whole, &path);
                 source.report(span, format!("{path} {problem}"));
@@ -347,6 +349,21 @@ photons = 3
         assert!(config.population.phantoms.is_empty());
         let open = expanded("${DATA", &|_| None).unwrap_err();
         assert!(open.contains("does not close it"), "{open}");
+    }
+
+    #[test]
+    fn paths_start_at_the_files_folder() {
+        let text = "[population]\nspecimens = [\"../data/a\", \"/b\"]\nsurfaces = [\"c\"]\n";
+        let config = Config::parse(text, Path::new("/studies/one/my.toml"), &|_| None).unwrap();
+        let population = &config.population;
+        assert_eq!(
+            population.specimens,
+            [Path::new("/studies/one/../data/a"), Path::new("/b")]
+        );
+        assert_eq!(population.surfaces, [Path::new("/studies/one/c")]);
+        // What is written elsewhere means the same folders.
+        let written = Config::parse(&config.to_toml(), Path::new("/x/study.toml"), &|_| None);
+        assert_eq!(written.unwrap(), config);
     }
 
     #[test]

@@ -99,15 +99,12 @@ impl Preparation {
                     read_specimen(&path).map_err(|cause| Failure::new("specimen", cause))?
                 }
                 SpecimenSource::Surfaces(path) => {
-                    let origin = SurfacesOrigin {
-                        name: name.to_owned(),
-                        sex: "unknown".into(),
-                        licence: "that of the surfaces".into(),
-                        from: name.to_owned(),
-                    };
                     let parameters = &self.config.population.surface_bodies;
-                    read_bone_surfaces(&path)
-                        .and_then(|bones| specimen_from_surfaces(&bones, &origin, parameters))
+                    SurfacesOrigin::of_folder(&path, name)
+                        .and_then(|origin| {
+                            let bones = read_bone_surfaces(&path)?;
+                            specimen_from_surfaces(&bones, &origin, parameters)
+                        })
                         .map_err(|cause| Failure::new("specimen", cause))?
                 }
             };

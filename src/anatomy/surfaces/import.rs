@@ -5,6 +5,7 @@ use super::bone_density::{BoneTissue, DepthProfile, smooth_step};
 use super::error::ImportError;
 use super::near_surface::near_surface;
 use super::noise::GaussianField;
+use super::origin::SurfacesOrigin;
 use super::parameters::SurfacesParameters;
 use super::soft_tissue::soft_tissue;
 use super::voxelize::for_each_inside;
@@ -17,19 +18,6 @@ use crate::volume::{Grid, Surface, Volume};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 use rayon::prelude::*;
-
-/// What people know about a specimen and surfaces do not say.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SurfacesOrigin {
-    /// Letters, digits and `-`.
-    pub name: String,
-    /// `male`, `female` or `unknown`.
-    pub sex: String,
-    /// Licence of the surfaces.
-    pub licence: String,
-    /// Where the surfaces come from, for people.
-    pub from: String,
-}
 
 /// Scales of the trabecular texture (mm), in equal parts; fitted to the correlation of the
 /// Visible Human Male's.
@@ -260,7 +248,7 @@ impl Bone<'_> {
                 let head = &found.heads[side.index()];
                 let from_head = (at - head.center).norm() / head.radius_mm;
                 let in_head = 1.0 - smooth_step(0.8, 1.3, from_head);
-                let upper = spongy(p.cortical_mm, p.trabecular_hu * (0.7 + 0.9 * in_head));
+                let upper = spongy(p.cortical_mm, p.trabecular_hu * (0.7 + 1.1 * in_head));
                 let tube = smooth_step(SHAFT_MM.0, SHAFT_MM.1, head.center.z - at.z);
                 let mix = |a: f64, b: f64| a + (b - a) * tube;
                 BoneTissue {

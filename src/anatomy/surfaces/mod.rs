@@ -9,6 +9,7 @@ mod error;
 mod import;
 mod near_surface;
 mod noise;
+mod origin;
 mod parameters;
 mod ply;
 mod soft_tissue;
@@ -16,5 +17,6 @@ mod voxelize;
 
 pub use bone_files::{BONE_FILES, read_bone_surfaces};
 pub use error::ImportError;
-pub use import::{SurfacesOrigin, specimen_from_surfaces};
+pub use import::specimen_from_surfaces;
+pub use origin::{ORIGIN_FILE, SurfacesOrigin};
 pub use parameters::SurfacesParameters;
