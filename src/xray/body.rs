@@ -114,7 +114,7 @@ impl BodyVolume {
                         y1: band * BAND + rows.len() / width,
                     };
                     Projection::new(kernel, rays, step_mm, rect, width)
-                        .from_row(rect.y0)
+                        .starting_at(rect.y0)
                         .add(self.simd, rows);
                 });
         }

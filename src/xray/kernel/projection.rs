@@ -58,7 +58,7 @@ impl<'a> Projection<'a> {
     }
 
     /// The same projection for an output that holds the image from this row on.
-    pub fn from_row(self, first_row: usize) -> Self {
+    pub fn starting_at(self, first_row: usize) -> Self {
         Self { first_row, ..self }
     }
 
