@@ -18,4 +18,6 @@ pub use camera::{Camera, Orbit};
 pub use footprint::PixelRect;
 
 #[cfg(test)]
+mod closed_form_tests;
+#[cfg(test)]
 mod projection_tests;
