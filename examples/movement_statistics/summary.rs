@@ -32,10 +32,8 @@ pub fn print(draws: &[Draw]) {
     by_component(draws);
     println!("\n## Where rejected fragments overlap the pelvis\n");
     by_cut(draws);
-    if draws.iter().any(|d| d.voxel_free.is_some()) {
-        println!("\n## The test on voxels\n");
-        on_voxels(draws);
-    }
+    println!("\n## The same draws under other tests\n");
+    other_tests(draws);
 }
 
 fn fragments(draws: &[Draw]) -> impl Iterator<Item = &[Draw]> {
@@ -165,39 +163,51 @@ fn by_cut(draws: &[Draw]) {
 /// Whether a draw is kept.
 type Test = fn(&Draw) -> bool;
 
-/// What the test on voxels would have accepted of the same draws, each fragment with equal weight,
-/// beside the test on surfaces.
-fn on_voxels(draws: &[Draw]) {
+/// What other tests keep of the same draws, each fragment with equal weight.
+fn other_tests(draws: &[Draw]) {
     println!("| test | rotation deg | translation mm | accepted |");
     println!("|---|---|---|---|");
-    let rows: [(&str, Test); 3] = [
-        ("surfaces", Draw::is_free),
-        ("voxels", |d| d.voxel_free == Some(true)),
+    let rows: [(&str, Test); 6] = [
+        ("all", Draw::is_free),
+        ("all, on voxels", |d| d.voxel_free == Some(true)),
+        ("without the femur", |d| d.outcome != CAUSES[0]),
+        ("without overlaps at the pubis cut", |d| {
+            d.is_free() || d.cut == "pubis"
+        }),
+        ("without overlaps at the posterior cut", |d| {
+            d.is_free() || d.cut == "posterior"
+        }),
         ("none", |_| true),
     ];
-    for (name, free) in rows {
+    for (name, kept) in rows {
         let (mut rotation, mut translation) = (Weighted::default(), Weighted::default());
         for fragment in fragments(draws) {
-            let kept: Vec<&Draw> = fragment.iter().filter(|d| free(d)).collect();
+            let kept: Vec<&Draw> = fragment.iter().filter(|d| kept(d)).collect();
             for d in &kept {
                 rotation.add(d.rotation_deg, 1.0 / kept.len() as f64);
                 translation.add(d.translation_mm, 1.0 / kept.len() as f64);
             }
         }
-        let count = draws.iter().filter(|d| free(d)).count();
+        let count = draws.iter().filter(|d| kept(d)).count();
+        if count > 0 {
+            println!(
+                "| {name} | {} | {} | {} |",
+                rotation.mean_and_sd(),
+                translation.mean_and_sd(),
+                percent(count, draws.len())
+            );
+        }
+    }
+    let both = |d: &&Draw| d.voxel_free.is_some();
+    let differ = |d: &&Draw| d.voxel_free.is_some_and(|free| free != d.is_free());
+    let asked = draws.iter().filter(both).count();
+    if asked > 0 {
+        let count = draws.iter().filter(differ).count();
         println!(
-            "| {name} | {} | {} | {} |",
-            rotation.mean_and_sd(),
-            translation.mean_and_sd(),
-            percent(count, draws.len())
+            "\nSurfaces and voxels differ on {} of the draws.",
+            percent(count, asked)
         );
     }
-    let differ = |d: &&Draw| d.voxel_free.is_some_and(|free| free != d.is_free());
-    let count = draws.iter().filter(differ).count();
-    println!(
-        "\nThe two tests differ on {} of the draws.",
-        percent(count, draws.len())
-    );
 }
 
 #[derive(Default)]
