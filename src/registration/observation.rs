@@ -44,7 +44,7 @@ pub enum Shape {
         nominal: CutPlanes,
         annotations: Arc<Vec<CutAnnotation>>,
         /// How the models of the estimated shape are made.
-        recipe: ModelRecipe,
+        recipe: Arc<ModelRecipe>,
     },
 }
 

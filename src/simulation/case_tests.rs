@@ -15,7 +15,8 @@ use std::sync::{Arc, OnceLock};
 
 /// The nominal surgery on both hips of a phantom of 2 mm, and on those of its mirror image.
 fn operations() -> &'static [[(Arc<Hip>, Operation); 2]; 2] {
-    static MADE: OnceLock<[[(Arc<Hip>, Operation); 2]; 2]> = OnceLock::new();
+    type Operated = [(Arc<Hip>, Operation); 2];
+    static MADE: OnceLock<[Operated; 2]> = OnceLock::new();
     MADE.get_or_init(|| {
         let coarse = PhantomParameters {
             voxel_mm: 2.0,

@@ -40,7 +40,7 @@ pub struct PreparedHip {
     pub pelvis_surface: Arc<Surface>,
     /// The planned cuts.
     pub nominal: CutPlanes,
-    pub recipe: ModelRecipe,
+    pub recipe: Arc<ModelRecipe>,
     femur: OnceLock<Result<Arc<BoneVolume>, Failure>>,
     full_pelvis: OnceLock<Result<Arc<BoneVolume>, Failure>>,
     nominal_models: OnceLock<Result<BoneModels, Failure>>,
@@ -129,11 +129,11 @@ impl Preparation {
             pelvis_surface: surface.clone(),
             hip: Arc::new(hip),
             nominal,
-            recipe: ModelRecipe {
+            recipe: Arc::new(ModelRecipe {
                 attenuation: self.config.xray.attenuation.clone(),
                 fragment: surgery.fragment.clone(),
                 plausibility: surgery.plausibility.clone(),
-            },
+            }),
             femur: OnceLock::new(),
             full_pelvis: OnceLock::new(),
             nominal_models: OnceLock::new(),
