@@ -1,5 +1,6 @@
 //! Specimens: CT, labels, landmarks, rims; their anatomical frames; where they come from.
 
+pub mod check;
 pub mod detect;
 pub mod disk;
 pub mod frame;

@@ -93,7 +93,8 @@ fn draw_on<B: DrawingBackend>(backend: B, figure: &impl Figure) -> Result<(), St
     area.present().map_err(|e| e.to_string())
 }
 
-fn register_letters() {
+/// Makes the letters known that every figure uses.
+pub(super) fn register_letters() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
         // Refused only when the bytes are no font, which these are.

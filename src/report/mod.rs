@@ -11,6 +11,7 @@ pub mod picture;
 pub mod reference;
 pub mod rows;
 pub mod sampling_table;
+pub mod specimen;
 pub mod table;
 pub mod tests_table;
 pub mod write;

@@ -125,17 +125,7 @@ impl Picture {
     /// # Errors
     /// When the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), PictureError> {
-        let write = || -> Result<(), png::EncodingError> {
-            let file = std::io::BufWriter::new(std::fs::File::create(path)?);
-            let mut encoder = png::Encoder::new(file, self.width as u32, self.height as u32);
-            encoder.set_color(png::ColorType::Rgb);
-            let bytes = self.rgb.as_flattened();
-            encoder.write_header()?.write_image_data(bytes)
-        };
-        write().map_err(|cause| PictureError {
-            path: path.to_owned(),
-            cause,
-        })
+        write_png(path, self.width, self.height, &self.rgb)
     }
 
     fn place(&self, at: &Pixel) -> (i64, i64) {
@@ -148,6 +138,25 @@ impl Picture {
             self.rgb[y as usize * self.width + x as usize] = colour;
         }
     }
+}
+
+/// Writes pixels, row by row, as PNG.
+pub(super) fn write_png(
+    path: &Path,
+    width: usize,
+    height: usize,
+    rgb: &[Colour],
+) -> Result<(), PictureError> {
+    let write = || -> Result<(), png::EncodingError> {
+        let file = std::io::BufWriter::new(std::fs::File::create(path)?);
+        let mut encoder = png::Encoder::new(file, width as u32, height as u32);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.write_header()?.write_image_data(rgb.as_flattened())
+    };
+    write().map_err(|cause| PictureError {
+        path: path.to_owned(),
+        cause,
+    })
 }
 
 #[cfg(test)]

@@ -234,7 +234,8 @@ fn crash(results: &Path, key: &str, times: usize) {
     use crate::store::{Record, journal::Writer};
     let study = open(results, STUDY);
     for _ in 0..times {
-        let provenance = serde_json::to_value(Provenance::now(&study.config, 1)).unwrap();
+        let provenance =
+            serde_json::to_value(Provenance::now(&study.config, Default::default(), 1)).unwrap();
         let mut writer = Writer::create(&study.folder.journals(), provenance).unwrap();
         writer
             .append(&Record::Started("phantom-1/left/f00/m00".into()))

@@ -41,7 +41,7 @@ pub enum StudyError {
     )]
     Busy { path: PathBuf, lock: PathBuf },
     #[error(
-        "the study in {} was begun with another configuration or program:\n{}\ntake another name or --results folder, or accept each change by name (--accept {})",
+        "the study in {} was begun with another configuration, other data or another program:\n{}\ntake another name or --results folder, or accept each change by name (--accept {})",
         path.display(), differences.join("\n"), keys.join(" --accept ")
     )]
     Mixed {

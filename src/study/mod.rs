@@ -8,6 +8,7 @@ mod config_file;
 mod config_table;
 #[cfg(test)]
 mod engine_tests;
+pub mod fingerprint;
 pub mod folder;
 pub mod key;
 mod key_row;

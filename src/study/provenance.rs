@@ -3,6 +3,7 @@
 use super::Config;
 use crate::simd::SimdLevel;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// One attempt's circumstances. Rows of attempts that differ in `config` or `code` are not mixed
@@ -17,6 +18,9 @@ pub struct Provenance {
     pub commit: String,
     /// BLAKE3 of the configuration's keys that results depend on.
     pub config: String,
+    /// Fingerprint of the files of each specimen that has some, by its name.
+    #[serde(default)]
+    pub specimens: BTreeMap<String, String>,
     /// Level of vector instructions.
     pub simd: SimdLevel,
     pub host: String,
@@ -30,14 +34,16 @@ pub struct Provenance {
 }
 
 impl Provenance {
-    /// The circumstances of a run that begins now.
-    pub fn now(config: &Config, threads: usize) -> Self {
+    /// The circumstances of a run that begins now, on specimens of these
+    /// [`fingerprints`](super::fingerprint::fingerprints).
+    pub fn now(config: &Config, specimens: BTreeMap<String, String>, threads: usize) -> Self {
         let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
         Self {
             version: env!("CARGO_PKG_VERSION").into(),
             code: env!("PAO_SIM_CODE_HASH").into(),
             commit: env!("PAO_SIM_COMMIT").into(),
             config: config.hash(),
+            specimens,
             simd: SimdLevel::current(),
             host: first_line("/proc/sys/kernel/hostname").unwrap_or_else(|| "unknown".into()),
             platform: format!("{}-{}", std::env::consts::OS, std::env::consts::ARCH),

@@ -1,5 +1,6 @@
 //! A study with its folder: opening, running, resuming.
 
+use super::fingerprint::fingerprints;
 use super::folder::{StudyError, StudyFolder, io};
 use super::runner::{Ending, Event, RunOptions, run};
 use super::snapshot::{provenances, select_simd, write_table};
@@ -7,6 +8,7 @@ use super::{Config, Plan, Provenance, State, Worker};
 use crate::store::journal::{self, Writer};
 use crate::store::{COMPLETE, Record, Row, SET_ASIDE};
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::Path;
 use std::sync::Mutex;
@@ -19,13 +21,16 @@ pub struct Study {
     pub plan: Plan,
     /// What was done before this process.
     pub state: State,
+    /// Fingerprints of the specimens' files.
+    specimens: BTreeMap<String, String>,
     _lock: File,
 }
 
 /// What a user accepts or asks for when a study is opened again.
 #[derive(Clone, Debug, Default)]
 pub struct OpenOptions {
-    /// Configuration keys, or `code`, that may differ from what the study was begun with.
+    /// Configuration keys, `specimen.NAME` or `code`, that may differ from what the study was begun
+    /// with.
     pub accept: Vec<String>,
 }
 
@@ -54,15 +59,17 @@ impl Study {
     /// vector instructions to that of the study.
     ///
     /// # Errors
-    /// When the folder cannot be used, another process has it, or it was begun with another
-    /// configuration or program and that was not accepted.
+    /// When the folder cannot be used, another process has it, a specimen's file cannot be read, or
+    /// the study was begun with another configuration, other data or another program and that was
+    /// not accepted.
     pub fn open(config: Config, results: &Path, options: &OpenOptions) -> Result<Self, StudyError> {
         let folder = StudyFolder::of(results, &config.study.name);
         let lock = folder.lock()?;
         let journals = journal::read_all(&folder.journals())?;
         let earlier = provenances(&journals);
         select_simd(&journals)?;
-        check_unchanged(&folder, &config, &earlier, options)?;
+        let specimens = fingerprints(&config.population)?;
+        check_unchanged(&folder, &config, &specimens, &earlier, options)?;
         let file = folder.config_file();
         folder.write(&file, &config.to_toml())?;
         let plan = Plan::of(&config);
@@ -78,6 +85,7 @@ impl Study {
             config,
             plan,
             state,
+            specimens,
             _lock: lock,
         })
     }
@@ -95,7 +103,8 @@ impl Study {
     ) -> Result<Outcome, StudyError> {
         let again = |row: &Row| redo == Redo::Failed && row.text("status") != COMPLETE;
         let left = self.state.left(&self.plan, again);
-        let provenance = Provenance::now(&self.config, options.threads);
+        let specimens = self.specimens.clone();
+        let provenance = Provenance::now(&self.config, specimens, options.threads);
         let provenance = serde_json::to_value(provenance).expect("provenance is plain data");
         let mut writer = Writer::create(&self.folder.journals(), provenance)?;
         self.write_manifest()?;
@@ -191,6 +200,7 @@ impl Study {
 fn check_unchanged(
     folder: &StudyFolder,
     config: &Config,
+    specimens: &BTreeMap<String, String>,
     earlier: &[Provenance],
     options: &OpenOptions,
 ) -> Result<(), StudyError> {
@@ -202,6 +212,21 @@ fn check_unchanged(
         for difference in before.differences(config) {
             differences.push(difference.to_string());
             keys.push(difference.key);
+        }
+    }
+    for (name, now) in specimens {
+        let last = earlier.iter().rev().find_map(|p| p.specimens.get(name));
+        if let Some(before) = last
+            && before != now
+        {
+            let short = |hash: &str| hash.chars().take(12).collect::<String>();
+            let key = format!("specimen.{name}");
+            differences.push(format!(
+                "  {key}: was data of fingerprint {}, is {}: its files were changed",
+                short(before),
+                short(now)
+            ));
+            keys.push(key);
         }
     }
     let code = env!("PAO_SIM_CODE_HASH");

@@ -17,6 +17,13 @@ const START_RADIUS_MM: f64 = 23.0;
 /// do not.
 const BAND_MM: f64 = 1.0;
 
+/// Rounds of the fit.
+const ROUNDS: i32 = 200;
+
+/// On coarse surfaces a few vertices may join the band and leave it for ever; the sphere then moves to
+/// and fro by less than this (mm), far below the surface's own accuracy.
+const SWAY_MM: f64 = 0.05;
+
 /// A worse fit is refused (mm RMS).
 const MAX_RMS_MM: f64 = 1.0;
 
@@ -36,7 +43,7 @@ pub struct Head {
 /// vertices in a band about the sphere, which narrows from 5 to 1 mm while the fit settles.
 ///
 /// `local` gives the directions; its origin plays no part.
-pub(super) fn femoral_head(
+pub(in crate::anatomy) fn femoral_head(
     femur: &Surface,
     side: Side,
     local: &Local,
@@ -64,7 +71,7 @@ pub(super) fn femoral_head(
     let away_from_neck = Vector::new(-1.0, 1.0, 0.0).normalize();
     let mut center = most_medial + Vector::x() * START_RADIUS_MM;
     let mut radius = START_RADIUS_MM;
-    for round in 0..200 {
+    for round in 0..ROUNDS {
         let band = BAND_MM + 4.0 * 0.9_f64.powi(round);
         let near: Vec<Vector> = proximal
             .iter()
@@ -78,7 +85,8 @@ pub(super) fn femoral_head(
             sphere(&near).ok_or_else(|| not_found("too few vertices lie on one sphere"))?;
         let step = (next - center).norm();
         (center, radius) = (next, next_radius);
-        if round > 60 && step < 1e-9 {
+        let settled = step < 1e-9 || (round == ROUNDS - 1 && step < SWAY_MM);
+        if round > 60 && settled {
             let square: f64 = near
                 .iter()
                 .map(|p| ((p - center).norm() - radius).powi(2))

@@ -5,7 +5,7 @@ use crate::geometry::{Point, Vector};
 /// A frame of one side of the pelvis: (lateral, superior, anterior) in mm from an origin. It is
 /// right-handed on the left and left-handed on the right, so that a rule reads the same on both.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Local {
+pub(in crate::anatomy) struct Local {
     pub origin: Point,
     /// World directions (unit, orthogonal): lateral, superior, anterior.
     pub axes: [Vector; 3],

@@ -21,4 +21,6 @@ mod symphysis;
 pub use bones::BoneSurfaces;
 pub use error::DetectError;
 pub use head::Head;
+pub(in crate::anatomy) use head::femoral_head;
 pub use landmarks::{Detected, detect};
+pub(in crate::anatomy) use local::Local;

@@ -27,3 +27,7 @@ const CT_FILE: &str = "ct.nii.gz";
 const LABELS_FILE: &str = "labels.nii.gz";
 const LANDMARKS_FILE: &str = "landmarks.csv";
 const RIMS_FILE: &str = "rims.csv";
+
+/// Every file of a specimen's folder.
+pub const SPECIMEN_FILES: [&str; 5] =
+    [HEADER_FILE, CT_FILE, LABELS_FILE, LANDMARKS_FILE, RIMS_FILE];

@@ -1,6 +1,8 @@
 //! `pao-sim specimen`: making, showing and checking specimens.
 
+mod check;
 mod import;
+mod show;
 mod source;
 
 use super::args::Common;
@@ -19,10 +21,16 @@ enum Command {
     /// Make a specimen's folder from other data.
     #[command(subcommand)]
     Import(import::From),
+    /// Draw a specimen: radiograph, landmarks, rims, planned cuts and fragments.
+    Show(show::Arguments),
+    /// Prove on a specimen's own data that its sides, frames and units are right.
+    Check(check::Arguments),
 }
 
 pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     match &arguments.command {
         Command::Import(from) => import::main(from, common),
+        Command::Show(own) => show::main(own, common),
+        Command::Check(own) => check::main(own, common),
     }
 }

@@ -1,9 +1,20 @@
-//! What bodies are made like.
+//! Which specimen a user means, and what bodies are made like.
 
 use crate::cli::error::Failure;
+use pao_sim::anatomy::{Specimen, phantom, read_specimen};
 use pao_sim::study::Config;
 use pao_sim::study::config::PopulationSection;
 use std::path::PathBuf;
+
+/// A specimen on the command line.
+#[derive(Debug, clap::Args)]
+pub struct Source {
+    /// A specimen's folder, or phantom-N for the built-in body of that number
+    #[arg(value_name = "SPECIMEN")]
+    specimen: PathBuf,
+    #[command(flatten)]
+    bodies: Bodies,
+}
 
 /// What bodies are made like.
 #[derive(Debug, clap::Args)]
@@ -20,6 +31,21 @@ impl Bodies {
         Ok(match &self.config {
             Some(file) => Config::read(file)?.population,
             None => PopulationSection::default(),
+        })
+    }
+}
+
+impl Source {
+    /// Reads or makes the specimen.
+    pub fn specimen(&self) -> Result<Specimen, Failure> {
+        let population = self.bodies.population()?;
+        let number = self.specimen.to_str().and_then(|name| {
+            let number = name.strip_prefix("phantom-")?;
+            number.parse().ok().filter(|number| *number > 0)
+        });
+        Ok(match number {
+            Some(number) => phantom(number, &population.phantom),
+            None => read_specimen(&self.specimen)?,
         })
     }
 }

@@ -1,0 +1,145 @@
+//! Pixels, lines and words.
+
+use crate::geometry::Pixel;
+use crate::report::canvas::register_letters;
+use crate::report::picture::{Colour, PictureError, write_png};
+use plotters::prelude::*;
+use std::path::Path;
+
+/// A picture in colours. Positions are (column, row), integers at pixel centres.
+#[derive(Clone, Debug)]
+pub struct Painting {
+    width: usize,
+    height: usize,
+    rgb: Vec<Colour>,
+}
+
+impl Painting {
+    /// A black picture.
+    pub fn new(width: usize, height: usize) -> Self {
+        Self {
+            width,
+            height,
+            rgb: vec![[0; 3]; width * height],
+        }
+    }
+
+    /// Columns.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rows.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// One pixel's colour.
+    pub fn at(&self, x: usize, y: usize) -> Colour {
+        self.rgb[y * self.width + x]
+    }
+
+    /// Sets one pixel.
+    pub fn set(&mut self, x: usize, y: usize, colour: Colour) {
+        self.rgb[y * self.width + x] = colour;
+    }
+
+    /// Mixes a colour into one pixel; `share` 0 leaves it, 1 replaces it.
+    pub fn tint(&mut self, x: usize, y: usize, colour: Colour, share: f64) {
+        let old = self.at(x, y);
+        let mix = |n: usize| f64::from(old[n]) * (1.0 - share) + f64::from(colour[n]) * share;
+        self.set(x, y, [mix(0) as u8, mix(1) as u8, mix(2) as u8]);
+    }
+
+    /// Draws a line through points; what lies outside of the picture is left out.
+    pub fn line(&mut self, points: impl IntoIterator<Item = Pixel>, colour: Colour) {
+        let points: Vec<(i32, i32)> = points.into_iter().map(place).collect();
+        self.draw(|area| area.draw(&PathElement::new(points, stroke(colour))));
+    }
+
+    /// Draws a cross.
+    pub fn cross(&mut self, at: &Pixel, arm: i32, colour: Colour) {
+        let (x, y) = place(*at);
+        for (from, to) in [((x - arm, y), (x + arm, y)), ((x, y - arm), (x, y + arm))] {
+            self.draw(|area| area.draw(&PathElement::new([from, to], stroke(colour))));
+        }
+    }
+
+    /// Writes words to the right of and below a position.
+    pub fn words(&mut self, at: &Pixel, text: &str, size: u32, colour: Colour) {
+        register_letters();
+        let style = ("sans-serif", size).into_font().color(&rgb(colour));
+        self.draw(|area| area.draw(&Text::new(text.to_owned(), place(*at), style)));
+    }
+
+    /// Copies another picture to where its first pixel lies at (`x`, `y`).
+    ///
+    /// # Panics
+    /// When it does not fit.
+    pub fn paste(&mut self, other: &Self, x: usize, y: usize) {
+        for row in 0..other.height {
+            let to = (y + row) * self.width + x;
+            let from = row * other.width;
+            self.rgb[to..to + other.width].copy_from_slice(&other.rgb[from..from + other.width]);
+        }
+    }
+
+    /// Writes it as PNG.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), PictureError> {
+        write_png(path, self.width, self.height, &self.rgb)
+    }
+
+    /// Draws with plotters into the pixels, which cannot fail.
+    fn draw<E: std::fmt::Debug>(
+        &mut self,
+        element: impl FnOnce(&DrawingArea<BitMapBackend, plotters::coord::Shift>) -> Result<(), E>,
+    ) {
+        let size = (self.width as u32, self.height as u32);
+        let area =
+            BitMapBackend::with_buffer(self.rgb.as_flattened_mut(), size).into_drawing_area();
+        element(&area).expect("pixels in memory take every drawing");
+    }
+}
+
+/// Beyond this many pixels nothing is drawn, and integers are not exceeded.
+const FAR: f64 = 1e5;
+
+fn place(at: Pixel) -> (i32, i32) {
+    let near = |v: f64| v.clamp(-FAR, FAR).round() as i32;
+    (near(at.x), near(at.y))
+}
+
+fn rgb([r, g, b]: Colour) -> RGBColor {
+    RGBColor(r, g, b)
+}
+
+fn stroke(colour: Colour) -> ShapeStyle {
+    rgb(colour).stroke_width(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn drawings_lie_where_they_are_asked_for() {
+        let mut painting = Painting::new(40, 30);
+        painting.cross(&Pixel::new(10.0, 20.0), 2, [255, 0, 0]);
+        assert_eq!(painting.at(12, 20), [255, 0, 0]);
+        assert_eq!(painting.at(10, 18), [255, 0, 0]);
+        assert_eq!(painting.at(11, 19), [0, 0, 0]);
+        painting.line([Pixel::new(-50.0, 5.0), Pixel::new(1e9, 5.0)], [0, 255, 0]);
+        assert_eq!(
+            (painting.at(0, 5), painting.at(39, 5)),
+            ([0, 255, 0], [0, 255, 0])
+        );
+        let before = painting.rgb.iter().filter(|c| **c == [0; 3]).count();
+        painting.words(&Pixel::new(2.0, 8.0), "ASIS", 11, [255; 3]);
+        assert!(painting.rgb.iter().filter(|c| **c == [0; 3]).count() < before);
+        painting.tint(0, 5, [0, 0, 255], 0.5);
+        assert_eq!(painting.at(0, 5), [0, 127, 127]);
+    }
+}

@@ -1,0 +1,390 @@
+//! The built binary on specimens: what it makes, shows, proves and refuses.
+
+use assert_cmd::Command;
+use pao_sim::anatomy::surfaces::BONE_FILES;
+use pao_sim::anatomy::{PhantomParameters, Specimen, phantom, read_specimen, write_specimen};
+use pao_sim::report::Rows;
+use pao_sim::store::{Kind, Role, SCHEMA};
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+use tempfile::TempDir;
+
+/// The phantom of `configs/smoke.toml`.
+const VOXEL_MM: f64 = 3.0;
+
+static BODY: LazyLock<Specimen> = LazyLock::new(|| {
+    let parameters = PhantomParameters {
+        voxel_mm: VOXEL_MM,
+        ..Default::default()
+    };
+    phantom(1, &parameters)
+});
+
+/// A folder with the body in `phantom-1`.
+fn written() -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let body = folder.path().join("phantom-1");
+    write_specimen(&BODY, &body).unwrap();
+    (folder, body)
+}
+
+fn pao_sim() -> Command {
+    Command::cargo_bin("pao-sim").expect("cargo builds the binary for its tests")
+}
+
+/// What a command prints that must end with an exit code: standard output, standard error.
+fn said(command: &mut Command, code: i32) -> (String, String) {
+    let assert = command.assert().code(code);
+    let output = assert.get_output();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (text(&output.stdout), text(&output.stderr))
+}
+
+fn check(specimen: &Path, code: i32) -> (String, String) {
+    said(pao_sim().args(["specimen", "check"]).arg(specimen), code)
+}
+
+/// A closed box as PLY, `mm` long, without its last `open` faces.
+fn cuboid(mm: f64, open: usize) -> String {
+    let faces = [
+        "0 2 3 1", "4 5 7 6", "0 1 5 4", "2 6 7 3", "0 4 6 2", "1 3 7 5",
+    ];
+    let mut text = format!(
+        "ply\nformat ascii 1.0\nelement vertex 8\nproperty double x\nproperty double y\nproperty double z\n\
+         element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+        faces.len() - open
+    );
+    for n in 0..8u8 {
+        let at = |bit: u8| f64::from(n >> bit & 1) * mm;
+        text += &format!("{} {} {}\n", at(0), at(1), at(2));
+    }
+    for face in &faces[..faces.len() - open] {
+        text += &format!("4 {face}\n");
+    }
+    text
+}
+
+/// A folder of boxes instead of bones.
+fn boxes(mm: f64) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for file in BONE_FILES {
+        std::fs::write(folder.path().join(file), cuboid(mm, 0)).unwrap();
+    }
+    folder
+}
+
+/// Imports surfaces in vain; gives what is said, having seen that nothing was written.
+fn refused_import(surfaces: &Path) -> String {
+    let place = tempfile::tempdir().unwrap();
+    let out = place.path().join("made");
+    let (_, said) = said(
+        pao_sim()
+            .args(["specimen", "import", "surfaces"])
+            .arg(surfaces)
+            .arg("--out")
+            .arg(&out),
+        1,
+    );
+    assert_eq!(
+        std::fs::read_dir(place.path()).unwrap().count(),
+        0,
+        "{said}"
+    );
+    said
+}
+
+#[test]
+fn a_written_body_is_read_again_as_it_was() {
+    let (_folder, path) = written();
+    let again = read_specimen(&path).unwrap();
+    assert_eq!(again.ct.grid, BODY.ct.grid);
+    assert!(again.ct.data == BODY.ct.data && again.labels.data == BODY.labels.data);
+    assert_eq!(again.landmarks, BODY.landmarks);
+    assert_eq!(again.rims, BODY.rims);
+    assert_eq!((&again.name, &again.source), (&BODY.name, &BODY.source));
+}
+
+#[test]
+fn a_sound_body_is_proved_and_drawn() {
+    let (folder, path) = written();
+    let (table, _) = check(&path, 0);
+    for line in [
+        "APP axes orthonormal",
+        "left MOF from bone",
+        "right LCE angle",
+        "0 wrong",
+    ] {
+        assert!(table.contains(line), "expected '{line}' in {table}");
+    }
+    let pictures = folder.path().join("pictures");
+    let (_, errors) = said(
+        pao_sim()
+            .args(["specimen", "show"])
+            .arg(&path)
+            .arg("--out")
+            .arg(&pictures),
+        0,
+    );
+    assert_eq!(errors, "");
+    for picture in ["ap.png", "left_hip.png", "right_hip.png"] {
+        let bytes = std::fs::read(pictures.join(picture)).unwrap();
+        assert!(
+            bytes.starts_with(b"\x89PNG") && bytes.len() > 50_000,
+            "{picture}"
+        );
+    }
+}
+
+#[test]
+fn phantoms_need_no_folder() {
+    let place = tempfile::tempdir().unwrap();
+    let config = place.path().join("coarse.toml");
+    std::fs::write(&config, "[population.phantom]\nvoxel_mm = 3.0\n").unwrap();
+    let (lines, _) = said(
+        pao_sim()
+            .args(["--json", "specimen", "check", "phantom-3", "--config"])
+            .arg(&config),
+        0,
+    );
+    let first: serde_json::Value = serde_json::from_str(lines.lines().next().unwrap()).unwrap();
+    assert_eq!(first["specimen"], "phantom-3");
+    assert_eq!(first["verdict"], "ok");
+}
+
+#[test]
+fn a_body_with_left_for_right_is_refused() {
+    let mut body = BODY.clone();
+    body.labels = BODY.labels.map(|label| [0, 1, 3, 2][usize::from(label)]);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("swapped");
+    write_specimen(&body, &path).unwrap();
+    let (table, _) = check(&path, 1);
+    let line = table
+        .lines()
+        .find(|l| l.starts_with("label of the left femur"))
+        .unwrap();
+    assert!(line.ends_with("WRONG"), "{table}");
+}
+
+#[test]
+fn every_mistake_of_a_folder_is_named() {
+    let (_folder, path) = written();
+    std::fs::remove_file(path.join("rims.csv")).unwrap();
+    std::fs::write(path.join("ct.nii.gz"), "no volume").unwrap();
+    let (_, errors) = check(&path, 1);
+    assert!(errors.contains("rims.csv is missing"), "{errors}");
+    assert!(
+        errors.contains("ct.nii.gz is not a NIfTI-1 file"),
+        "{errors}"
+    );
+}
+
+#[test]
+fn an_absent_label_and_a_landmark_outside_are_named() {
+    let (_folder, path) = written();
+    let landmarks = std::fs::read_to_string(path.join("landmarks.csv")).unwrap();
+    let outside = |line: &str| match line.strip_prefix("MOF_l,") {
+        Some(_) => "MOF_l,1,2,9000\n".to_owned(),
+        None => format!("{line}\n"),
+    };
+    let landmarks: String = landmarks.lines().map(outside).collect();
+    std::fs::write(path.join("landmarks.csv"), landmarks).unwrap();
+    let labels = BODY.labels.map(|label| if label == 3 { 0 } else { label });
+    std::fs::remove_file(path.join("labels.nii.gz")).unwrap();
+    pao_sim::volume::write_nifti(&labels, &path.join("labels.nii.gz")).unwrap();
+    let (_, errors) = check(&path, 1);
+    assert!(
+        errors.contains("no voxel has label 3 (right femur)"),
+        "{errors}"
+    );
+    assert!(
+        errors.contains("landmark MOF_l (1.0, 2.0, 9000.0) lies outside"),
+        "{errors}"
+    );
+}
+
+#[test]
+fn open_surfaces_missing_ones_and_wrong_units_are_named() {
+    let surfaces = boxes(200.0);
+    let at = |file: &str| surfaces.path().join(file);
+    std::fs::write(at("Hip_L.ply"), cuboid(200.0, 1)).unwrap();
+    std::fs::write(at("Femur_R.ply"), "solid femur").unwrap();
+    // Two mistakes in two files are told together.
+    let message = refused_import(surfaces.path());
+    assert!(
+        message.contains("Hip_L.ply is not closed: 4 edges"),
+        "{message}"
+    );
+    assert!(
+        message.contains("Femur_R.ply is not a readable PLY"),
+        "{message}"
+    );
+    std::fs::remove_file(at("Sacrum.ply")).unwrap();
+    std::fs::remove_file(at("Femur_L.ply")).unwrap();
+    let message = refused_import(surfaces.path());
+    assert!(
+        message.contains("lacks Sacrum.ply, Femur_L.ply"),
+        "{message}"
+    );
+
+    let message = refused_import(boxes(0.2).path());
+    assert!(message.contains("Sacrum.ply is 0.200 mm long"), "{message}");
+    assert!(message.contains("another unit"), "{message}");
+    // Boxes are no bones.
+    let message = refused_import(boxes(200.0).path());
+    assert!(message.contains("cannot find the landmarks"), "{message}");
+}
+
+#[test]
+fn an_existing_folder_is_not_touched() {
+    let (_folder, path) = written();
+    let surfaces = boxes(200.0);
+    let (_, errors) = said(
+        pao_sim()
+            .args(["specimen", "import", "surfaces"])
+            .arg(surfaces.path())
+            .arg("--out")
+            .arg(&path),
+        1,
+    );
+    assert!(errors.contains("exists already"), "{errors}");
+    read_specimen(&path).unwrap();
+}
+
+/// A study of one registration on the body, from the phantom's number or from a folder.
+fn study(name: &str, population: &str) -> String {
+    let smoke = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/smoke.toml");
+    let smoke = std::fs::read_to_string(smoke).unwrap();
+    for part in ["name = \"smoke\"", "phantoms = 1", "initializations = 2"] {
+        assert!(smoke.contains(part), "{part}");
+    }
+    smoke
+        .replace("name = \"smoke\"", &format!("name = \"{name}\""))
+        .replace("phantoms = 1", population)
+        .replace(
+            "initializations = 2",
+            "initializations = 1\nscenarios = [\"ilium_pubis_estimated\"]",
+        )
+}
+
+fn run(folder: &Path, config: &Path) -> Command {
+    let mut command = pao_sim();
+    command
+        .arg("--results")
+        .arg(folder)
+        .arg("run")
+        .arg(config)
+        .args(["--threads", "1"]);
+    command
+}
+
+/// Every promised column of every row, numbers by their bits.
+fn promised(table: &Path) -> Vec<(String, Vec<String>)> {
+    let rows = Rows::read(table).unwrap();
+    assert_eq!(rows.len(), 1);
+    let columns = SCHEMA
+        .columns
+        .iter()
+        .filter(|c| c.role != Role::Measurement);
+    columns
+        .map(|column| {
+            let values = match column.kind {
+                Kind::Text => rows.text(&column.name).to_vec(),
+                _ => {
+                    let numbers = rows.numbers(&column.name).iter();
+                    numbers
+                        .map(|number| format!("{:x}", number.to_bits()))
+                        .collect()
+                }
+            };
+            (column.name.clone(), values)
+        })
+        .collect()
+}
+
+#[test]
+fn a_study_gives_the_same_rows_from_the_folder_and_refuses_other_data() {
+    let (folder, path) = written();
+    let results = folder.path().join("results");
+    let direct = folder.path().join("direct.toml");
+    std::fs::write(&direct, study("direct", "phantoms = 1")).unwrap();
+    run(&results, &direct).assert().success();
+    // A relative path starts at the configuration, not where the command is given.
+    let from_folder = folder.path().join("folder.toml");
+    let population = "phantoms = 0\nspecimens = [\"phantom-1\"]";
+    std::fs::write(&from_folder, study("folder", population)).unwrap();
+    run(&results, &from_folder).assert().success();
+    let rows = |study: &str| promised(&results.join(study).join("registrations.parquet"));
+    assert_eq!(rows("folder"), rows("direct"));
+
+    let landmarks = path.join("landmarks.csv");
+    let text = std::fs::read_to_string(&landmarks).unwrap();
+    std::fs::write(&landmarks, text.clone() + "# looked at again\n").unwrap();
+    let (_, errors) = said(&mut run(&results, &from_folder), 2);
+    assert!(errors.contains("specimen.phantom-1: was"), "{errors}");
+    assert!(errors.contains("--accept specimen.phantom-1"), "{errors}");
+    let mut accepted = run(&results, &from_folder);
+    accepted
+        .args(["--accept", "specimen.phantom-1"])
+        .assert()
+        .success();
+    run(&results, &from_folder).assert().success();
+    std::fs::remove_file(&landmarks).unwrap();
+    let (_, errors) = said(&mut run(&results, &from_folder), 1);
+    assert!(errors.contains("landmarks.csv"), "{errors}");
+}
+
+#[test]
+fn three_mistakes_of_a_configuration_are_named_with_their_lines() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = folder.path().join("bad.toml");
+    let text = "[population]\nphantoms = 0\nspecimen = [\"a\"]\nsides = [\"up\"]\n[study]\ninitializations = 0\n";
+    std::fs::write(&config, text).unwrap();
+    let (_, errors) = said(&mut run(&folder.path().join("results"), &config), 2);
+    for part in [
+        "bad.toml:3: population.specimen is no key",
+        "bad.toml:4: ",
+        "bad.toml:6: ",
+    ] {
+        assert!(errors.contains(part), "expected '{part}' in {errors}");
+    }
+    assert!(!folder.path().join("results").exists());
+}
+
+/// One real subject, coarse: everything from surfaces to pictures.
+#[test]
+fn a_real_subject_is_imported_and_proved() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/vsd/z042");
+    if !data.is_dir() {
+        assert!(std::env::var_os("PAO_SIM_REQUIRE_DATA").is_none());
+        println!("SKIPPED: no bones at {}", data.display());
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let config = folder.path().join("coarse.toml");
+    std::fs::write(&config, "[population.surface_bodies]\nvoxel_mm = 2.0\n").unwrap();
+    let out = folder.path().join("made");
+    said(
+        pao_sim()
+            .args(["specimen", "import", "surfaces"])
+            .arg(&data)
+            .arg("--out")
+            .arg(&out)
+            .args([
+                "--name",
+                "somebody",
+                "--sex",
+                "female",
+                "--licence",
+                "CC BY-NC-SA 4.0",
+            ])
+            .arg("--config")
+            .arg(&config),
+        0,
+    );
+    let made = read_specimen(&out).unwrap();
+    assert_eq!((&*made.name, &*made.source.sex), ("somebody", "female"));
+    assert_eq!(made.source.licence, "CC BY-NC-SA 4.0");
+    let (table, _) = check(&out, 0);
+    assert!(table.contains("0 wrong"), "{table}");
+}
