@@ -44,6 +44,16 @@ impl SimdLevel {
     /// All levels, the plainest first.
     pub const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Avx512];
 
+    /// The level itself.
+    ///
+    /// # Panics
+    /// When this processor lacks it.
+    pub fn expect_here(self) -> Self {
+        let highest = Self::detect();
+        assert!(self <= highest, "this processor lacks {}", self.name());
+        self
+    }
+
     /// The highest level of this processor.
     pub fn detect() -> Self {
         #[cfg(target_arch = "x86_64")]

@@ -3,11 +3,12 @@
 use assert_cmd::Command;
 use pao_sim::anatomy::surfaces::BONE_FILES;
 use pao_sim::anatomy::{PhantomParameters, Specimen, phantom, read_specimen, write_specimen};
-use pao_sim::report::Rows;
-use pao_sim::store::{Kind, Role, SCHEMA};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 use tempfile::TempDir;
+
+mod rows;
+use rows::promised;
 
 /// The phantom of `configs/smoke.toml`.
 const VOXEL_MM: f64 = 3.0;
@@ -276,30 +277,6 @@ fn run(folder: &Path, config: &Path) -> Command {
         .arg(config)
         .args(["--threads", "1"]);
     command
-}
-
-/// Every promised column of every row, numbers by their bits.
-fn promised(table: &Path) -> Vec<(String, Vec<String>)> {
-    let rows = Rows::read(table).unwrap();
-    assert_eq!(rows.len(), 1);
-    let columns = SCHEMA
-        .columns
-        .iter()
-        .filter(|c| c.role != Role::Measurement);
-    columns
-        .map(|column| {
-            let values = match column.kind {
-                Kind::Text => rows.text(&column.name).to_vec(),
-                _ => {
-                    let numbers = rows.numbers(&column.name).iter();
-                    numbers
-                        .map(|number| format!("{:x}", number.to_bits()))
-                        .collect()
-                }
-            };
-            (column.name.clone(), values)
-        })
-        .collect()
 }
 
 #[test]

@@ -101,6 +101,7 @@ mod tests {
     use crate::geometry::{Rigid, Vector};
     use crate::random::{Purpose, stream};
     use crate::shape_estimation::Crossing;
+    use crate::volume::surface_block::block;
     use crate::volume::{Grid, Volume};
     use crate::xray::Camera;
     use std::sync::Arc;
@@ -132,32 +133,6 @@ mod tests {
         Hip::new(Arc::new(specimen), side).unwrap()
     }
 
-    /// A closed box in the world.
-    fn block(min: Point, max: Point) -> (Vec<Point>, Vec<[u32; 3]>) {
-        let corner = |i: usize| {
-            let pick = |axis: usize| {
-                if i >> axis & 1 == 1 {
-                    max[axis]
-                } else {
-                    min[axis]
-                }
-            };
-            Point::new(pick(0), pick(1), pick(2))
-        };
-        let quads = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        let triangles = quads
-            .iter()
-            .flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]);
-        ((0..8).map(corner).collect(), triangles.collect())
-    }
-
     /// A slab of "ilium" above each head, 20 mm deep, and the annotations of a tilted cut through
     /// it as two known views see them.
     fn scene(side: Side) -> (Hip, Surface, Vec<RegisteredView>, Vec<CutAnnotation>, Plane) {
@@ -165,8 +140,8 @@ mod tests {
         let s = side.lateral_sign();
         let (low, high) = (40.0f64.min(130.0) * s, 130.0 * s);
         let (vertices, triangles) = block(
-            Point::new(low.min(high), -10.0, 20.0),
-            Point::new(low.max(high), 10.0, 110.0),
+            &Point::new(low.min(high), -10.0, 20.0),
+            &Point::new(low.max(high), 10.0, 110.0),
         );
         let surface = Surface::new(vertices, triangles);
         assert!(surface.volume() > 0.0);

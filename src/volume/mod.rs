@@ -7,6 +7,8 @@ pub mod grid;
 pub mod morphology;
 pub mod nifti;
 pub mod surface;
+#[cfg(test)]
+pub(crate) mod surface_block;
 mod surface_field;
 mod surface_nets;
 pub mod surface_query;

@@ -76,12 +76,7 @@ impl BodyVolume {
     /// # Panics
     /// When the processor lacks the level.
     pub fn with_simd(mut self, level: SimdLevel) -> Self {
-        assert!(
-            level <= SimdLevel::detect(),
-            "this processor lacks {}",
-            level.name()
-        );
-        self.simd = level;
+        self.simd = level.expect_here();
         self
     }
 

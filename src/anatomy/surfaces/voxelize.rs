@@ -118,6 +118,7 @@ fn meeting(corners: &[Point; 3], at: &Point) -> f64 {
 mod tests {
     use super::*;
     use crate::geometry::Vector;
+    use crate::volume::surface_block::block;
     use crate::volume::{SurfaceParameters, Volume};
 
     fn filled(surface: &Surface, grid: &Grid) -> Vec<bool> {
@@ -128,29 +129,8 @@ mod tests {
 
     /// A box whose faces, edges and diagonals pass exactly through rows of voxel centres.
     fn cuboid(low: [f64; 3], high: [f64; 3]) -> Surface {
-        let corner = |n: usize| {
-            let pick = |axis: usize| {
-                if n >> axis & 1 == 1 {
-                    high[axis]
-                } else {
-                    low[axis]
-                }
-            };
-            Point::new(pick(0), pick(1), pick(2))
-        };
-        let quads = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        let triangles = quads
-            .iter()
-            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-            .collect();
-        Surface::new((0..8).map(corner).collect(), triangles)
+        let (vertices, triangles) = block(&low.into(), &high.into());
+        Surface::new(vertices, triangles)
     }
 
     #[test]
