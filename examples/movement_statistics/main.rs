@@ -8,6 +8,7 @@
 //! printed tables are of all that lie in the folder.
 
 mod draws;
+mod femur;
 #[path = "../shared/mod.rs"]
 mod shared;
 mod slices;
@@ -39,6 +40,9 @@ struct Arguments {
     /// Also asks the test on voxels of the authors' public program.
     #[arg(long)]
     voxel_test: bool,
+    /// Prints how near each hip's femur lies to the ischium and where the two meet, and draws nothing.
+    #[arg(long)]
+    femur: bool,
     /// Folder of the tables.
     #[arg(long)]
     out: PathBuf,
@@ -63,10 +67,18 @@ fn main() -> Result<(), Box<dyn Error>> {
         },
         voxel_test: arguments.voxel_test,
     };
+    if arguments.femur {
+        println!("| hip | gap mm | overlap on the pelvis | overlap on the femur |");
+        println!("|---|---|---|---|");
+    }
     for name in &arguments.specimens {
         let specimen = Arc::new(shared::specimen(name, arguments.cache.as_deref())?);
         for side in Side::BOTH {
             let hip = Hip::new(specimen.clone(), side)?;
+            if arguments.femur {
+                println!("{}", femur::row(&hip, &plan.collision, plan.seed)?);
+                continue;
+            }
             let file = format!("{}.csv", hip.key().replace('/', "-"));
             let table = arguments.out.join(file);
             if !table.exists() {
@@ -78,6 +90,9 @@ fn main() -> Result<(), Box<dyn Error>> {
                 slices::draw(&hip, &model, &map, folder, plan.seed)?;
             }
         }
+    }
+    if arguments.femur {
+        return Ok(());
     }
     let mut tables: Vec<PathBuf> = std::fs::read_dir(&arguments.out)?
         .map(|entry| Ok(entry?.path()))
