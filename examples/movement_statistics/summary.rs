@@ -130,17 +130,30 @@ fn by_size(draws: &[Draw]) {
     }
 }
 
+/// Components of all draws and of accepted ones, and the means of what each cause rejects.
 fn by_component(draws: &[Draw]) {
-    println!("| | drawn | accepted |");
-    println!("|---|---|---|");
+    let causes: [(&str, Test); 5] = [
+        ("ilium cut", |d| d.cut == "ilium"),
+        ("ischium cut", |d| d.cut == "ischium"),
+        ("posterior cut", |d| d.cut == "posterior"),
+        ("pubis cut", |d| d.cut == "pubis"),
+        ("femur as one body", |d| d.outcome == CAUSES[1]),
+    ];
+    let names = causes.map(|(name, _)| name).join(" | ");
+    println!("| | drawn | accepted | mean rejected for {names} |");
+    println!("|---|---|---|{}", "---|".repeat(causes.len()));
     for (n, name) in COMPONENTS.iter().enumerate() {
-        let all: Vec<f64> = draws.iter().map(|d| d.components()[n]).collect();
-        let free = draws.iter().filter(|d| d.is_free());
-        let free: Vec<f64> = free.map(|d| d.components()[n]).collect();
+        let of = |kept: Test| -> Vec<f64> {
+            let kept = draws.iter().filter(|d| kept(d));
+            kept.map(|d| d.components()[n]).collect()
+        };
         println!(
-            "| {name} | {} | {} |",
-            mean_and_sd(&all),
-            mean_and_sd(&free)
+            "| {name} | {} | {} | {} |",
+            mean_and_sd(&of(|_| true)),
+            mean_and_sd(&of(Draw::is_free)),
+            causes
+                .map(|(_, kept)| format!("{:.1}", mean(&of(kept))))
+                .join(" | ")
         );
     }
 }
