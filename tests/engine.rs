@@ -186,6 +186,36 @@ fn a_time_limit_that_is_over_begins_nothing() {
 }
 
 #[test]
+fn a_dry_run_tells_what_is_left_and_touches_nothing() {
+    let left = |results: &Path| {
+        let told = pao_sim(results)
+            .args(["--json", "run", SMOKE, "--dry-run"])
+            .assert()
+            .success();
+        let told: serde_json::Value = serde_json::from_slice(&told.get_output().stdout).unwrap();
+        (
+            told["left"].as_u64().unwrap(),
+            told["planned"].as_u64().unwrap(),
+        )
+    };
+    let nothing = tempfile::tempdir().unwrap();
+    assert_eq!(left(nothing.path()), (8, 8));
+    assert_eq!(std::fs::read_dir(nothing.path()).unwrap().count(), 0);
+    assert_eq!(left(WHOLE.path()), (0, 8));
+    // What a run refuses, a dry run refuses.
+    let other = nothing.path().join("other.toml");
+    let smoke = std::fs::read_to_string(SMOKE).unwrap();
+    std::fs::write(&other, smoke.replace("step_mm = 3.0", "step_mm = 2.0")).unwrap();
+    let refused = pao_sim(WHOLE.path())
+        .arg("run")
+        .arg(&other)
+        .arg("--dry-run")
+        .assert()
+        .code(2);
+    assert!(text(&refused.get_output().stderr).contains("step_mm"));
+}
+
+#[test]
 fn a_plan_counts_the_papers_registrations() {
     let results = tempfile::tempdir().unwrap();
     let plan = pao_sim(results.path())

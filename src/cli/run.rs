@@ -6,7 +6,8 @@ use super::output::say;
 use super::progress::Progress;
 use super::{logging, report, stop};
 use pao_sim::study::{
-    CaseWorker, Config, Ending, OpenOptions, Outcome, Redo, RunOptions, Snapshot, Study,
+    CaseWorker, Config, Ending, OpenOptions, Outcome, Plan, Redo, RunOptions, Snapshot, Study,
+    StudyFolder,
 };
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -28,6 +29,9 @@ pub struct Arguments {
     /// Accept that this configuration key, or `code`, differs from what the study was begun with.
     #[arg(long, value_name = "KEY")]
     accept: Vec<String>,
+    /// Say what is left to do, and do nothing: no file is made or changed.
+    #[arg(long)]
+    dry_run: bool,
 }
 
 pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
@@ -40,6 +44,15 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let open = OpenOptions {
         accept: arguments.accept.clone(),
     };
+    let redo = if arguments.retry_failed {
+        Redo::Failed
+    } else {
+        Redo::Nothing
+    };
+    if arguments.dry_run {
+        let (done, _) = Study::preview(&config, &common.results, &open, redo)?;
+        return Ok(tell_left(&config, done, threads, common));
+    }
     let mut study = Study::open(config, &common.results, &open)?;
     logging::start(&study.folder.logs())?;
     let flag = stop::flag()?;
@@ -48,11 +61,6 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         cases_in_flight: study.config.run.cases_in_flight,
         stop: &flag,
         deadline: arguments.time_limit.map(|limit| begin + limit),
-    };
-    let redo = if arguments.retry_failed {
-        Redo::Failed
-    } else {
-        Redo::Nothing
     };
     let worker = CaseWorker::new(&study.config);
     let (done, failed) = study.counted(redo);
@@ -78,6 +86,24 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         (Ending::Done, 0) => Exit::Complete,
         (Ending::Done, _) => Exit::FailedRows,
     })
+}
+
+/// What a run would do.
+fn tell_left(config: &Config, done: usize, threads: usize, common: &Common) -> Exit {
+    let planned = Plan::of(config).len();
+    let left = planned - done;
+    if common.json {
+        let line = serde_json::json!({ "planned": planned, "done": done, "left": left });
+        say!("{line}");
+    } else {
+        let folder = StudyFolder::of(&common.results, &config.study.name);
+        say!(
+            "study {}: {left} of {planned} registrations are left; a run would do them with {threads} threads in {}",
+            config.study.name,
+            folder.path().display()
+        );
+    }
+    Exit::Complete
 }
 
 fn tell(study: &Snapshot, outcome: &Outcome, common: &Common) {

@@ -97,7 +97,50 @@ mod tests {
         );
     }
 
-    /// A change of these values changes every study.
+    /// A change of these values changes every study; a new purpose adds a line and changes none.
+    #[test]
+    fn the_first_value_of_every_purpose_is_pinned() {
+        let purposes = [
+            Purpose::PhantomShape,
+            Purpose::PhantomTexture,
+            Purpose::Cuts,
+            Purpose::Movement,
+            Purpose::MuscleFill,
+            Purpose::Wires,
+            Purpose::Views,
+            Purpose::Noise,
+            Purpose::Pick,
+            Purpose::Annotation,
+            Purpose::Ransac,
+            Purpose::Optimizer,
+            Purpose::Bootstrap,
+            Purpose::AssignedDensity,
+        ];
+        let lines: Vec<String> = purposes
+            .iter()
+            .map(|&purpose| {
+                let first = stream(20190506, purpose, "key").next_u64();
+                format!("{} {first:016x}", purpose.name())
+            })
+            .collect();
+        insta::assert_snapshot!(lines.join("\n"), @r"
+        phantom-shape 6440628e3fe10299
+        phantom-texture f0f0172827a81b6e
+        cuts a5f7eab3755a9253
+        movement baabb72922b9ce52
+        muscle-fill 831499dee72896ad
+        wires c46426c72861a6be
+        views 83783fd91be417cc
+        noise da7e2074ce670767
+        pick 98b00d531dabee2d
+        annotation e0009e1df5a489d5
+        ransac 7ecadf5d1cfd7145
+        optimizer c55adee757ecbcd8
+        bootstrap c4b527152d1d97af
+        assigned-density 1f248961d9da7204
+        ");
+    }
+
     #[test]
     fn values_are_pinned() {
         let mut s = stream(20190506, Purpose::Movement, "phantom-1/left/f00/m00");

@@ -6,7 +6,7 @@ use super::runner::{Ending, Event, RunOptions, run};
 use super::snapshot::{provenances, select_simd, write_table};
 use super::{Config, Plan, Provenance, State, Worker};
 use crate::store::journal::{self, Writer};
-use crate::store::{COMPLETE, Record, Row, SET_ASIDE};
+use crate::store::{COMPLETE, Journal, Record, Row, SET_ASIDE};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -65,11 +65,7 @@ impl Study {
     pub fn open(config: Config, results: &Path, options: &OpenOptions) -> Result<Self, StudyError> {
         let folder = StudyFolder::of(results, &config.study.name);
         let lock = folder.lock()?;
-        let journals = journal::read_all(&folder.journals())?;
-        let earlier = provenances(&journals);
-        select_simd(&journals)?;
-        let specimens = fingerprints(&config.population)?;
-        check_unchanged(&folder, &config, &specimens, &earlier, options)?;
+        let (journals, specimens) = examine(&folder, &config, options)?;
         let file = folder.config_file();
         folder.write(&file, &config.to_toml())?;
         let plan = Plan::of(&config);
@@ -88,6 +84,22 @@ impl Study {
             specimens,
             _lock: lock,
         })
+    }
+
+    /// How many registrations of a configuration's plan are done, and how many of those failed, if the
+    /// study were opened now. Makes, changes and claims nothing.
+    ///
+    /// # Errors
+    /// As [`Self::open`], but for the claim.
+    pub fn preview(
+        config: &Config,
+        results: &Path,
+        options: &OpenOptions,
+        redo: Redo,
+    ) -> Result<(usize, usize), StudyError> {
+        let folder = StudyFolder::of(results, &config.study.name);
+        let (journals, _) = examine(&folder, config, options)?;
+        Ok(counted(&Plan::of(config), &State::of(&journals), redo))
     }
 
     /// Does what is left, and writes the table and the manifest. Running again continues.
@@ -152,12 +164,7 @@ impl Study {
 
     /// How many registrations of the plan count as done, and how many of those failed.
     pub fn counted(&self, redo: Redo) -> (usize, usize) {
-        let rows = || self.state.planned_rows(&self.plan);
-        let failed = rows().filter(|row| row.text("status") != COMPLETE).count();
-        match redo {
-            Redo::Nothing => (rows().count(), failed),
-            Redo::Failed => (rows().count() - failed, 0),
-        }
+        counted(&self.plan, &self.state, redo)
     }
 
     fn outcome(&self, ending: Ending) -> Outcome {
@@ -195,6 +202,29 @@ impl Study {
         let text = serde_json::to_string_pretty(&manifest).expect("JSON is text") + "\n";
         self.folder.write(&self.folder.manifest(), &text)
     }
+}
+
+fn counted(plan: &Plan, state: &State, redo: Redo) -> (usize, usize) {
+    let rows = || state.planned_rows(plan);
+    let failed = rows().filter(|row| row.text("status") != COMPLETE).count();
+    match redo {
+        Redo::Nothing => (rows().count(), failed),
+        Redo::Failed => (rows().count() - failed, 0),
+    }
+}
+
+/// The journals of a study that may go on with this configuration, and the fingerprints of its
+/// specimens. Fixes the process' level of vector instructions to that of the study.
+fn examine(
+    folder: &StudyFolder,
+    config: &Config,
+    options: &OpenOptions,
+) -> Result<(Vec<Journal>, BTreeMap<String, String>), StudyError> {
+    let journals = journal::read_all(&folder.journals())?;
+    select_simd(&journals)?;
+    let specimens = fingerprints(&config.population)?;
+    check_unchanged(folder, config, &specimens, &provenances(&journals), options)?;
+    Ok((journals, specimens))
 }
 
 fn check_unchanged(
