@@ -53,8 +53,34 @@ impl Painting {
 
     /// Draws a line through points; what lies outside of the picture is left out.
     pub fn line(&mut self, points: impl IntoIterator<Item = Pixel>, colour: Colour) {
-        let points: Vec<(i32, i32)> = points.into_iter().map(place).collect();
-        self.draw(|area| area.draw(&PathElement::new(points, stroke(colour))));
+        let points: Vec<Pixel> = points.into_iter().collect();
+        for ends in points.windows(2) {
+            if let Some(seen) = self.seen(ends[0], ends[1]) {
+                let path = seen.map(place).to_vec();
+                self.draw(|area| area.draw(&PathElement::new(path, stroke(colour))));
+            }
+        }
+    }
+
+    /// The part of a segment that lies in the picture. (plotters clamps the ends' coordinates one by
+    /// one, which turns a line that leaves the picture.)
+    fn seen(&self, from: Pixel, to: Pixel) -> Option<[Pixel; 2]> {
+        let along = to - from;
+        let (mut begin, mut end) = (0.0f64, 1.0f64);
+        for (axis, size) in [self.width, self.height].into_iter().enumerate() {
+            let last = size as f64 - 1.0;
+            if along[axis] == 0.0 {
+                if !(0.0..=last).contains(&from[axis]) {
+                    return None;
+                }
+                continue;
+            }
+            let a = -from[axis] / along[axis];
+            let b = (last - from[axis]) / along[axis];
+            begin = begin.max(a.min(b));
+            end = end.min(a.max(b));
+        }
+        (begin <= end).then(|| [from + along * begin, from + along * end])
     }
 
     /// Draws a cross.
@@ -136,10 +162,21 @@ mod tests {
             (painting.at(0, 5), painting.at(39, 5)),
             ([0, 255, 0], [0, 255, 0])
         );
+        // A line that leaves through two sides keeps its slope.
+        painting.line(
+            [Pixel::new(-100.0, -45.0), Pixel::new(100.0, 55.0)],
+            [9, 9, 9],
+        );
+        for x in [10, 20, 30] {
+            assert_ne!(painting.at(x, 5 + x / 2), [0; 3], "{x}");
+            assert_eq!(painting.at(x, 8 + x / 2), [0; 3], "{x}");
+        }
+        painting.line([Pixel::new(-9.0, 3.0), Pixel::new(-1.0, 3.0)], [7; 3]);
+        assert_eq!(painting.at(0, 3), [0, 0, 0]);
         let before = painting.rgb.iter().filter(|c| **c == [0; 3]).count();
         painting.words(&Pixel::new(2.0, 8.0), "ASIS", 11, [255; 3]);
         assert!(painting.rgb.iter().filter(|c| **c == [0; 3]).count() < before);
-        painting.tint(0, 5, [0, 0, 255], 0.5);
-        assert_eq!(painting.at(0, 5), [0, 127, 127]);
+        painting.tint(35, 5, [0, 0, 255], 0.5);
+        assert_eq!(painting.at(35, 5), [0, 127, 127]);
     }
 }
