@@ -27,12 +27,7 @@ pub fn specimen(name: &str, cache: Option<&Path>) -> Result<Specimen, Box<dyn Er
     if let Some(kept) = kept.as_ref().filter(|kept| kept.is_dir()) {
         return Ok(read_specimen(kept)?);
     }
-    let origin = SurfacesOrigin {
-        name: own_name,
-        sex: "unknown".into(),
-        licence: "that of the surfaces".into(),
-        from: name.into(),
-    };
+    let origin = SurfacesOrigin::of_folder(folder, &own_name)?;
     let bones = read_bone_surfaces(folder)?;
     let made = specimen_from_surfaces(&bones, &origin, &SurfacesParameters::default())?;
     if let Some(kept) = kept {

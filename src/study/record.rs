@@ -2,7 +2,7 @@
 
 use super::case_worker::SimulatedCase;
 use super::{Failure, Scenario};
-use crate::anatomy::{LceApex, lce_angle};
+use crate::anatomy::{LceApex, lce, lce_angle};
 use crate::geometry::pose_error::{PoseError, fragment_movement};
 use crate::geometry::{Point, Rigid};
 use crate::registration::{Outcome, ShapeOutcome};
@@ -177,10 +177,7 @@ fn lce_deg(
     apex: LceApex,
 ) -> Result<f64, Failure> {
     let hip = &case.fragment.hip.hip;
-    let apex = match apex {
-        LceApex::PreoperativeHead => Point::origin(),
-        LceApex::MovedHead => femur * Point::origin(),
-    };
+    let apex = lce::apex(apex, femur);
     lce_angle(&hip.rim_in_app(), hip.side, fragment, &apex)
         .map(f64::to_degrees)
         .map_err(|cause| Failure::new("lce", cause))
