@@ -6,7 +6,7 @@ use super::output::say;
 use super::progress::Progress;
 use super::{logging, report, stop};
 use pao_sim::study::{
-    CaseWorker, Config, Ending, OpenOptions, Outcome, Plan, Redo, RunOptions, Snapshot, Study,
+    CaseWorker, Config, Ending, OpenOptions, Outcome, Redo, RunOptions, Snapshot, Study,
     StudyFolder,
 };
 use std::path::PathBuf;
@@ -50,8 +50,9 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         Redo::Nothing
     };
     if arguments.dry_run {
-        let (done, _) = Study::preview(&config, &common.results, &open, redo)?;
-        return Ok(tell_left(&config, done, threads, common));
+        let (planned, done) = Study::preview(&config, &common.results, &open, redo)?;
+        tell_left(&config, planned, done, threads, common);
+        return Ok(Exit::Complete);
     }
     let mut study = Study::open(config, &common.results, &open)?;
     logging::start(&study.folder.logs())?;
@@ -89,8 +90,7 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
 }
 
 /// What a run would do.
-fn tell_left(config: &Config, done: usize, threads: usize, common: &Common) -> Exit {
-    let planned = Plan::of(config).len();
+fn tell_left(config: &Config, planned: usize, done: usize, threads: usize, common: &Common) {
     let left = planned - done;
     if common.json {
         let line = serde_json::json!({ "planned": planned, "done": done, "left": left });
@@ -103,7 +103,6 @@ fn tell_left(config: &Config, done: usize, threads: usize, common: &Common) -> E
             folder.path().display()
         );
     }
-    Exit::Complete
 }
 
 fn tell(study: &Snapshot, outcome: &Outcome, common: &Common) {

@@ -86,7 +86,7 @@ impl Study {
         })
     }
 
-    /// How many registrations of a configuration's plan are done, and how many of those failed, if the
+    /// How many registrations a configuration plans, and how many of them would count as done if the
     /// study were opened now. Makes, changes and claims nothing.
     ///
     /// # Errors
@@ -99,7 +99,9 @@ impl Study {
     ) -> Result<(usize, usize), StudyError> {
         let folder = StudyFolder::of(results, &config.study.name);
         let (journals, _) = examine(&folder, config, options)?;
-        Ok(counted(&Plan::of(config), &State::of(&journals), redo))
+        let plan = Plan::of(config);
+        let (done, _) = counted(&plan, &State::of(&journals), redo);
+        Ok((plan.len(), done))
     }
 
     /// Does what is left, and writes the table and the manifest. Running again continues.
