@@ -3,6 +3,7 @@
 use crate::geometry::Pixel;
 use crate::report::canvas::register_letters;
 use crate::report::picture::{Colour, PictureError, write_png};
+use nalgebra::Vector2;
 use plotters::prelude::*;
 use std::path::Path;
 
@@ -85,9 +86,11 @@ impl Painting {
 
     /// Draws a cross.
     pub fn cross(&mut self, at: &Pixel, arm: i32, colour: Colour) {
-        let (x, y) = place(*at);
-        for (from, to) in [((x - arm, y), (x + arm, y)), ((x, y - arm), (x, y + arm))] {
-            self.draw(|area| area.draw(&PathElement::new([from, to], stroke(colour))));
+        for half in [
+            Vector2::new(f64::from(arm), 0.0),
+            Vector2::new(0.0, f64::from(arm)),
+        ] {
+            self.line([at - half, at + half], colour);
         }
     }
 
@@ -130,7 +133,7 @@ impl Painting {
     }
 }
 
-/// Beyond this many pixels nothing is drawn, and integers are not exceeded.
+/// Words farther off than this many pixels are not seen anyway, and integers are not exceeded.
 const FAR: f64 = 1e5;
 
 fn place(at: Pixel) -> (i32, i32) {
@@ -173,6 +176,8 @@ mod tests {
         }
         painting.line([Pixel::new(-9.0, 3.0), Pixel::new(-1.0, 3.0)], [7; 3]);
         assert_eq!(painting.at(0, 3), [0, 0, 0]);
+        painting.cross(&Pixel::new(-9.0, 26.0), 2, [7; 3]);
+        assert_eq!(painting.at(0, 26), [0, 0, 0]);
         let before = painting.rgb.iter().filter(|c| **c == [0; 3]).count();
         painting.words(&Pixel::new(2.0, 8.0), "ASIS", 11, [255; 3]);
         assert!(painting.rgb.iter().filter(|c| **c == [0; 3]).count() < before);
