@@ -3,6 +3,10 @@
 //! The modules form one direction: each uses only those listed after it (ARCHITECTURE.md).
 
 pub mod anatomy;
+#[cfg(feature = "fail-points")]
+pub mod fail_point;
+#[cfg(not(feature = "fail-points"))]
+mod fail_point;
 pub mod geometry;
 pub mod image;
 pub mod objective;

@@ -1,7 +1,7 @@
 //! The arguments, and which subcommand they go to.
 
 use super::error::{Exit, Failure};
-use super::{plan, replay, report, run, show, specimen, status};
+use super::{isolated, plan, replay, report, run, show, specimen, status};
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -47,6 +47,8 @@ enum Command {
     Show(show::Arguments),
     /// Make, show and check specimens.
     Specimen(specimen::Arguments),
+    #[command(hide = true)]
+    Isolated(isolated::Arguments),
 }
 
 /// Parses the command line and does what it says.
@@ -61,6 +63,7 @@ pub fn main() -> ExitCode {
         Command::Replay(own) => replay::main(own, common),
         Command::Show(own) => show::main(own, common),
         Command::Specimen(own) => specimen::main(own, common),
+        Command::Isolated(own) => isolated::main(own, common),
     };
     match result {
         Ok(exit) => exit.into(),

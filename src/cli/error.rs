@@ -37,6 +37,8 @@ pub enum Failure {
     Import(#[from] pao_sim::anatomy::surfaces::ImportError),
     #[error("{phase}: {message}", phase = .0.phase, message = .0.message)]
     Work(pao_sim::study::Failure),
+    #[error("{0}")]
+    Usage(String),
     #[error("the study has no registration or case {0}; `pao-sim plan` tells what it consists of")]
     NotPlanned(String),
     #[error("cannot {action}: {cause}")]
@@ -55,8 +57,12 @@ impl Failure {
                 StudyError::Config(_)
                 | StudyError::NoStudy { .. }
                 | StudyError::NotBegun { .. }
-                | StudyError::Mixed { .. },
+                | StudyError::Mixed { .. }
+                | StudyError::Diverging { .. }
+                | StudyError::Newer { .. }
+                | StudyError::Guarded { .. },
             )
+            | Self::Usage(_)
             | Self::Key(_)
             | Self::NotPlanned(_) => Exit::Usage,
             _ => Exit::Error,

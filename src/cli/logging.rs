@@ -1,24 +1,22 @@
 //! Logs: everything to a file of the study, warnings to standard error too.
 
 use super::error::Failure;
-use std::fs::File;
+use std::fs::OpenOptions;
 use std::path::Path;
 use std::sync::Mutex;
-use std::time::{SystemTime, UNIX_EPOCH};
 use tracing::level_filters::LevelFilter;
 use tracing_subscriber::prelude::*;
 
-/// Opens a log file in `folder`, named by time and process, and sends warnings to standard error.
+/// Opens the log file of an attempt in `folder` (`0007.log`), and sends warnings to standard error.
 /// Panics are logged too, with the place where they happened: the row that failed by one holds its
 /// message only.
 ///
 /// # Errors
 /// When the file cannot be made.
-pub fn start(folder: &Path) -> Result<(), Failure> {
-    let now = SystemTime::now().duration_since(UNIX_EPOCH);
-    let seconds = now.map_or(0, |elapsed| elapsed.as_secs());
-    let path = folder.join(format!("{seconds}-{}.log", std::process::id()));
-    let file = File::create(&path).map_err(|cause| Failure::Io {
+pub fn start(folder: &Path, attempt: u32) -> Result<(), Failure> {
+    let path = folder.join(format!("{attempt:04}.log"));
+    let file = OpenOptions::new().create(true).append(true).open(&path);
+    let file = file.map_err(|cause| Failure::Io {
         action: format!("write the log {}", path.display()),
         cause,
     })?;

@@ -2,6 +2,8 @@
 
 mod args;
 mod error;
+mod isolated;
+mod job_end;
 mod logging;
 mod output;
 mod plan;

@@ -4,6 +4,9 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
+/// How the names of files begin that are not whole yet.
+const TEMPORARY: &str = ".writing-";
+
 /// Writes a file by way of a temporary one in the same folder: written, synced, renamed, the folder
 /// synced. Whoever reads `path` sees the old content or the new one.
 ///
@@ -15,18 +18,39 @@ pub fn write(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) 
         _ => Path::new("."),
     };
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".writing-");
+    builder.prefix(TEMPORARY);
     // A temporary file is for its owner only; a study's folder is often shared.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let temporary = builder.tempfile_in(folder)?;
     let mut out = BufWriter::new(temporary.as_file());
+    crate::fail_point!("write.begun");
     write(&mut out)?;
     out.flush()?;
     drop(out);
     temporary.as_file().sync_all()?;
+    crate::fail_point!("write.before_rename");
     temporary.persist(path).map_err(|error| error.error)?;
+    crate::fail_point!("write.after_rename");
     sync_folder(folder)
+}
+
+/// Removes what processes that died while they wrote have left in a folder. Nobody may be writing in it.
+///
+/// # Errors
+/// What the file system reports; that the folder is not there is none.
+pub fn remove_temporary_files(folder: &Path) -> io::Result<()> {
+    let entries = match std::fs::read_dir(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        entries => entries?,
+    };
+    for entry in entries {
+        let entry = entry?;
+        if entry.file_name().to_string_lossy().starts_with(TEMPORARY) {
+            std::fs::remove_file(entry.path())?;
+        }
+    }
+    Ok(())
 }
 
 /// Makes the folder's entries durable.

@@ -42,8 +42,9 @@ pub struct Column {
 pub const COMPLETE: &str = "complete";
 /// `status` of a registration that could not be made; `phase` and `message` say why.
 pub const FAILED: &str = "failed";
-/// `status` of a registration that was given up because it ended its process repeatedly.
-pub const SET_ASIDE: &str = "set_aside";
+/// `status` of a registration that is set aside because it, or its case's simulation, ended its process
+/// twice, the second time in a process that did nothing else.
+pub const CRASHED: &str = "crashed";
 
 /// Stages of the strategies, in the order in which they run: prefixes of the stage columns.
 pub const STAGES: [&str; 15] = [
@@ -153,7 +154,7 @@ impl Schema {
             self.add(name, kind, Role::Key, doc);
         }
         for (name, kind, doc) in [
-            ("status", Kind::Text, "complete, failed or set_aside"),
+            ("status", Kind::Text, "complete, failed or crashed"),
             ("phase", Kind::Text, "Where a registration failed"),
             ("message", Kind::Text, "Why it failed"),
             (

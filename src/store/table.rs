@@ -21,21 +21,23 @@ pub struct TableError {
 /// # Errors
 /// When the file cannot be written.
 pub fn write_parquet(path: &Path, rows: &[&Row]) -> Result<(), TableError> {
-    let columns = SCHEMA.columns.iter().enumerate();
-    let columns = columns.map(|(place, column)| column_of(rows, place, &column.name, column.kind));
-    let result = DataFrame::new(rows.len(), columns.collect())
-        .map_err(std::io::Error::other)
-        .and_then(|mut frame| {
-            durable::write(path, |out| {
-                let writer = ParquetWriter::new(out);
-                let written = writer.finish(&mut frame);
-                written.map(drop).map_err(std::io::Error::other)
-            })
-        });
+    let result = frame(rows).and_then(|mut frame| {
+        durable::write(path, |out| {
+            let written = ParquetWriter::new(out).finish(&mut frame);
+            written.map(drop).map_err(std::io::Error::other)
+        })
+    });
     result.map_err(|cause| TableError {
         path: path.to_owned(),
         cause,
     })
+}
+
+/// Rows as columns.
+pub(super) fn frame(rows: &[&Row]) -> std::io::Result<DataFrame> {
+    let columns = SCHEMA.columns.iter().enumerate();
+    let columns = columns.map(|(place, column)| column_of(rows, place, &column.name, column.kind));
+    DataFrame::new(rows.len(), columns.collect()).map_err(std::io::Error::other)
 }
 
 fn column_of(rows: &[&Row], place: usize, name: &str, kind: Kind) -> Column {

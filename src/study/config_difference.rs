@@ -50,6 +50,20 @@ impl Config {
         hasher.finalize().to_hex().to_string()
     }
 
+    /// Every key in which `now` differs from this configuration, a line each.
+    pub fn all_differences(&self, now: &Self) -> Vec<String> {
+        let (ours, theirs) = (flat(self), flat(now));
+        let keys: std::collections::BTreeSet<&String> = ours.keys().chain(theirs.keys()).collect();
+        keys.into_iter()
+            .filter(|key| ours.get(*key) != theirs.get(*key))
+            .map(|key| {
+                let values = [ours.get(key).cloned(), theirs.get(key).cloned()];
+                let key = key.clone();
+                Difference { key, values }.to_string()
+            })
+            .collect()
+    }
+
     /// The keys in which `now` would give other results than this configuration. More or fewer
     /// cases, scenarios or strategies are no difference: what both have in common is equal.
     pub fn differences(&self, now: &Self) -> Vec<Difference> {

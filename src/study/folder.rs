@@ -1,9 +1,12 @@
 //! The folder of a study: `results/<study>/`.
 
+use super::isolation::key_of;
 use super::{Config, ConfigError};
-use crate::store::{JournalError, TableError, durable};
-use std::fs::{File, TryLockError};
+use crate::store::locks::{self, Waited};
+use crate::store::{JournalError, Store, StoreError, TableError, durable};
+use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// Where a study's files lie.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -19,6 +22,10 @@ pub enum StudyError {
     Config(#[from] ConfigError),
     #[error(transparent)]
     Journal(#[from] JournalError),
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    #[error(transparent)]
+    Conflict(#[from] super::state::Conflict),
     #[error(transparent)]
     Table(#[from] TableError),
     #[error("cannot {action} {}: {cause}", path.display())]
@@ -36,10 +43,53 @@ pub enum StudyError {
     #[error("nothing was run of the study {name} yet ({} is not there); begin it with `pao-sim run`", path.display())]
     NotBegun { name: String, path: PathBuf },
     #[error(
-        "another process works on {}; wait for it or stop it (it holds {})",
-        path.display(), lock.display()
+        "another process works on share {theirs} of {}, which overlaps with {ours}: attempt {attempt} on {host} (process {process}), last heard of {silence} s ago; wait for it or stop it",
+        path.display()
     )]
-    Busy { path: PathBuf, lock: PathBuf },
+    Busy {
+        path: PathBuf,
+        ours: String,
+        theirs: String,
+        attempt: u32,
+        host: String,
+        process: u64,
+        /// Seconds since it last wrote.
+        silence: u64,
+    },
+    #[error(
+        "attempt {attempt} on {host} works on {} with another configuration, so shares cannot be told apart:\n{}\nwait for it, stop it, or use the configuration that it has",
+        path.display(), differences.join("\n")
+    )]
+    Diverging {
+        path: PathBuf,
+        attempt: u32,
+        host: String,
+        /// One line a difference.
+        differences: Vec<String>,
+    },
+    #[error("{} has been locked by another process for {} s; is it, or its machine, hanging?", path.display(), patience.as_secs())]
+    Locked { path: PathBuf, patience: Duration },
+    #[error(
+        "{} was written by a newer version of the program (format {found}, expected at most {expected}): use that version, or take another results folder",
+        path.display()
+    )]
+    Newer {
+        path: PathBuf,
+        found: u64,
+        expected: u64,
+    },
+    #[error(
+        "--fresh throws away {rows} rows of {attempts} attempts in {}; to do so give the study's name with it: --fresh={name}",
+        path.display()
+    )]
+    Guarded {
+        path: PathBuf,
+        name: String,
+        rows: usize,
+        attempts: usize,
+    },
+    #[error("cannot try again what was in work when an attempt died: {0}")]
+    Isolation(String),
     #[error(
         "the study in {} was begun with another configuration, other data or another program:\n{}\ntake another name or --results folder, or accept each change by name (--accept {})",
         path.display(), differences.join("\n"), keys.join(" --accept ")
@@ -127,37 +177,41 @@ impl StudyFolder {
         self.path.join("logs")
     }
 
-    /// Makes the folder and takes its lock, which lasts as long as the returned file.
+    /// Rows of attempts that are over.
+    pub fn parts(&self) -> PathBuf {
+        self.path.join("parts")
+    }
+
+    /// The records of the study.
+    pub fn store(&self) -> Store {
+        Store {
+            journals: self.journals(),
+            parts: self.parts(),
+            key_of,
+        }
+    }
+
+    /// Takes the study's lock, which lasts as long as the returned file. It is held for moments only:
+    /// while an attempt is begun or sealed, or a file made of all rows is written.
     ///
     /// # Errors
-    /// When it cannot be made, or another process has the lock.
+    /// When the folder cannot be written, or others have the lock for minutes.
     pub fn lock(&self) -> Result<File, StudyError> {
-        let logs = self.logs();
-        std::fs::create_dir_all(&logs).map_err(io("create", &logs))?;
         let path = self.path.join("lock");
-        let file = File::create(&path).map_err(io("create", &path))?;
-        match file.try_lock() {
-            Ok(()) => Ok(file),
-            Err(TryLockError::WouldBlock) => Err(StudyError::Busy {
-                path: self.path.clone(),
-                lock: path,
-            }),
-            // A file system without locks cannot tell; journals of several processes do not
-            // disturb each other, they only do some work twice.
-            Err(TryLockError::Error(cause)) => {
+        match locks::wait(&path, PATIENCE).map_err(io("write", &path))? {
+            Waited::Locked(file) => Ok(file),
+            Waited::NoLocks(file, cause) => {
                 tracing::warn!(
-                    "{} cannot be locked ({cause}): see to it that no other process runs this study",
+                    "{} cannot be locked ({cause}): see to it that no two processes have the same share, and start them one after the other",
                     path.display()
                 );
                 Ok(file)
             }
+            Waited::Busy => Err(StudyError::Locked {
+                path,
+                patience: PATIENCE,
+            }),
         }
-    }
-
-    /// True while another process has the lock.
-    pub fn is_locked(&self) -> bool {
-        let file = File::open(self.path.join("lock"));
-        file.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
     }
 
     /// Writes a small file at once or not at all.
@@ -168,6 +222,9 @@ impl StudyFolder {
         durable::write(path, |out| out.write_all(text.as_bytes())).map_err(io("write", path))
     }
 }
+
+/// How long a process waits for another one to begin or to end.
+const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Words an input or output error.
 pub(super) fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> StudyError {

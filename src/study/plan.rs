@@ -15,6 +15,9 @@ pub struct Plan {
     strategies: Vec<String>,
 }
 
+/// A case and its number in the plan, from 0.
+pub type CaseNumber<'a> = (usize, &'a CaseKey);
+
 impl Plan {
     /// The plan of a configuration.
     pub fn of(config: &Config) -> Self {

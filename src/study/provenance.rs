@@ -29,18 +29,32 @@ pub struct Provenance {
     /// Model of the processor, where the system tells it.
     pub cpu: String,
     pub threads: usize,
+    /// Number of the process on its host.
+    #[serde(default)]
+    pub process: u32,
+    /// Slurm's job and array task, or empty.
+    #[serde(default)]
+    pub slurm_job: String,
     /// Seconds since 1970 (UTC).
     pub started_unix: u64,
 }
 
+/// Version of the layout of a study's folder.
+pub const FORMAT: u64 = 2;
+
 impl Provenance {
+    /// Hash of this program's sources and lock file.
+    pub fn code_now() -> &'static str {
+        env!("PAO_SIM_CODE_HASH")
+    }
+
     /// The circumstances of a run that begins now, on specimens of these
     /// [`fingerprints`](super::fingerprint::fingerprints).
     pub fn now(config: &Config, specimens: BTreeMap<String, String>, threads: usize) -> Self {
         let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
         Self {
             version: env!("CARGO_PKG_VERSION").into(),
-            code: env!("PAO_SIM_CODE_HASH").into(),
+            code: Self::code_now().into(),
             commit: env!("PAO_SIM_COMMIT").into(),
             config: config.hash(),
             specimens,
@@ -49,8 +63,20 @@ impl Provenance {
             platform: format!("{}-{}", std::env::consts::OS, std::env::consts::ARCH),
             cpu: cpu_model().unwrap_or_else(|| "unknown".into()),
             threads,
+            process: std::process::id(),
+            slurm_job: slurm_job(&|name| std::env::var(name).ok()),
             started_unix: since_1970.map_or(0, |elapsed| elapsed.as_secs()),
         }
+    }
+}
+
+fn slurm_job(variable: &dyn Fn(&str) -> Option<String>) -> String {
+    match (
+        variable("SLURM_ARRAY_JOB_ID"),
+        variable("SLURM_ARRAY_TASK_ID"),
+    ) {
+        (Some(job), Some(task)) => format!("{job}_{task}"),
+        _ => variable("SLURM_JOB_ID").unwrap_or_default(),
     }
 }
 

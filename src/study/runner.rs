@@ -2,26 +2,36 @@
 
 use super::queue::{CaseWork, Queue, Task};
 use super::worker::{Failure, Worker};
-use super::{CaseKey, RegistrationKey};
-use crate::store::journal::Writer;
-use crate::store::{COMPLETE, FAILED, JournalError, Record, Row};
+use super::{CaseKey, RegistrationKey, Stop};
+use crate::store::journal::Sink;
+use crate::store::{COMPLETE, End, FAILED, JournalError, Record, Row};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// How a run is done. Nothing here changes a result.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct RunOptions<'a> {
     /// Threads, at least 1.
     pub threads: usize,
     /// Cases that may be held at once; 0 takes as many as keep the threads busy.
     pub cases_in_flight: usize,
-    /// Set from outside to end the run softly: what runs is finished, nothing new is begun.
-    pub stop: &'a AtomicBool,
-    /// Ends the run softly in time: nothing is begun that would not be done by then, going by the
-    /// longest so far.
-    pub deadline: Option<Instant>,
+    /// Ends the run softly: what runs is finished, or dropped when time is up; nothing is begun that
+    /// would not be done in time, going by the longest so far.
+    pub stop: &'a Stop,
+    /// Called once, with the number of committed rows so far, after the journal was told that
+    /// work is dropped. It should end the process: threads that compute cannot be interrupted.
+    pub leave: &'a (dyn Fn(usize) + Sync),
+}
+
+impl std::fmt::Debug for RunOptions<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("RunOptions")
+            .field("threads", &self.threads)
+            .field("cases_in_flight", &self.cases_in_flight)
+            .finish_non_exhaustive()
+    }
 }
 
 /// What a run tells while it goes on.
@@ -40,18 +50,21 @@ pub enum Event<'a> {
 pub enum Ending {
     /// All that was given was done.
     Done,
-    /// It was stopped before.
+    /// It was stopped before; whatever had begun was finished.
     Stopped,
+    /// Time was up: work that had begun was dropped.
+    Left,
 }
 
-/// Does the work and commits each row to the journal as it finishes.
+/// Does the work and commits each row to the journal as it finishes. Rows get the number `attempt`.
 ///
 /// # Errors
 /// When the journal cannot be written; what was committed before stays.
 pub fn run<W: Worker>(
     worker: &W,
     work: Vec<CaseWork>,
-    journal: &mut Writer,
+    attempt: u32,
+    journal: &mut dyn Sink,
     options: &RunOptions,
     events: &(dyn Fn(Event) + Sync),
 ) -> Result<Ending, JournalError> {
@@ -65,8 +78,9 @@ pub fn run<W: Worker>(
     let run = Run {
         worker,
         queue: Queue::new(work, limit),
-        attempt: journal.attempt(),
-        journal: Mutex::new(journal),
+        attempt,
+        journal: Mutex::new(Some(journal)),
+        rows: AtomicUsize::new(0),
         broken: Mutex::new(None),
         longest: Mutex::new(Duration::ZERO),
         options,
@@ -85,7 +99,7 @@ pub fn run<W: Worker>(
             .collect();
         let ticker = scope.spawn(|| {
             while !done.load(Ordering::Acquire) {
-                std::thread::park_timeout(Duration::from_millis(500));
+                std::thread::park_timeout(Duration::from_millis(100));
                 run.tick();
             }
         });
@@ -105,9 +119,15 @@ pub fn run<W: Worker>(
     if let Some(error) = broken.into_inner().unwrap_or_else(PoisonError::into_inner) {
         return Err(error);
     }
-    let journal = journal.into_inner().unwrap_or_else(PoisonError::into_inner);
-    journal.sync()?;
-    Ok(if done { Ending::Done } else { Ending::Stopped })
+    let left = journal
+        .into_inner()
+        .unwrap_or_else(PoisonError::into_inner)
+        .is_none();
+    Ok(match (left, done) {
+        (true, _) => Ending::Left,
+        (false, true) => Ending::Done,
+        (false, false) => Ending::Stopped,
+    })
 }
 
 struct Run<'a, W: Worker> {
@@ -115,7 +135,10 @@ struct Run<'a, W: Worker> {
     /// Cases with the seconds that their simulation took.
     queue: Queue<(W::Case, f64)>,
     attempt: u32,
-    journal: Mutex<&'a mut Writer>,
+    /// None once the run was left: what ends after that is dropped.
+    journal: Mutex<Option<&'a mut dyn Sink>>,
+    /// Rows that were committed.
+    rows: AtomicUsize,
     /// The journal's first error.
     broken: Mutex<Option<JournalError>>,
     /// The longest task so far.
@@ -200,26 +223,48 @@ impl<W: Worker> Run<'_, W> {
         row.set("registration_seconds", seconds);
         row.set("simulation_seconds", simulation_seconds);
         row.set("attempt", self.attempt);
+        crate::fail_point!("run.row_made");
         let record = Record::Row(Box::new(row));
-        self.append(&record);
-        if let Record::Row(row) = &record {
+        if self.append(&record)
+            && let Record::Row(row) = &record
+        {
+            crate::fail_point!("run.row_written");
+            self.rows.fetch_add(1, Ordering::SeqCst);
             (self.events)(Event::Row(row));
         }
     }
 
-    fn append(&self, record: &Record) {
+    /// True when the record was taken.
+    fn append(&self, record: &Record) -> bool {
         let mut journal = self.journal.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(journal) = journal.as_mut() else {
+            return false;
+        };
         let result = journal.append(record);
+        let taken = result.is_ok();
         self.note(result);
+        taken
     }
 
     fn tick(&self) {
         let mut journal = self.journal.lock().unwrap_or_else(PoisonError::into_inner);
-        let result = journal.sync_if_due();
+        let over = self.options.stop.is_over();
+        let result = match journal.as_mut() {
+            Some(journal) if over => journal.append(&Record::Ended(End {
+                left: true,
+                peak_memory_bytes: peak_memory_bytes(),
+            })),
+            Some(journal) => journal.sync_if_due(),
+            None => Ok(()),
+        };
+        let leaving = over && journal.take().is_some();
         drop(journal);
         self.note(result);
         if self.must_stop() {
             self.queue.close();
+        }
+        if leaving {
+            (self.options.leave)(self.rows.load(Ordering::SeqCst));
         }
         (self.events)(Event::Tick);
     }
@@ -235,8 +280,7 @@ impl<W: Worker> Run<'_, W> {
 
     fn must_stop(&self) -> bool {
         let longest = *self.longest.lock().unwrap_or_else(PoisonError::into_inner);
-        let too_late = |deadline: Instant| Instant::now() + longest > deadline;
-        self.options.stop.load(Ordering::Relaxed) || self.options.deadline.is_some_and(too_late)
+        self.options.stop.forbids(longest)
     }
 }
 
@@ -251,4 +295,12 @@ fn guarded<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<T, Failure> {
         let message = format!("the program met a case that it does not know: {text}");
         Err(Failure::new("panic", message))
     })
+}
+
+/// The most memory that this process held at once, where the system tells.
+pub fn peak_memory_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    let kibibytes: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(1024 * kibibytes)
 }

@@ -1,75 +1,111 @@
 //! A study with its folder: opening, running, resuming.
 
-use super::fingerprint::fingerprints;
 use super::folder::{StudyError, StudyFolder, io};
-use super::runner::{Ending, Event, RunOptions, run};
-use super::snapshot::{provenances, select_simd, write_table};
-use super::{Config, Plan, Provenance, State, Worker};
-use crate::store::journal::{self, Writer};
-use crate::store::{COMPLETE, Journal, Record, Row, SET_ASIDE};
+use super::isolation::{Broken, Isolation, try_suspects};
+use super::opening::{OpenOptions, check_free, examine};
+use super::provenance::FORMAT;
+use super::runner::{Ending, Event, RunOptions, peak_memory_bytes, run};
+use super::snapshot::write_table;
+use super::state::{Left, crashed_row};
+use super::{Config, Plan, Provenance, Shard, State, Worker};
+use crate::store::journal::Writer;
+use crate::store::{COMPLETE, End, Record, Row, durable};
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
-use std::fs::File;
 use std::path::Path;
-use std::sync::Mutex;
+use std::time::Duration;
 
-/// A study that is open for work: no other process has it.
+/// A study of which this process has a share.
 #[derive(Debug)]
 pub struct Study {
     pub folder: StudyFolder,
     pub config: Config,
     pub plan: Plan,
+    pub shard: Shard,
     /// What was done before this process.
     pub state: State,
-    /// Fingerprints of the specimens' files.
-    specimens: BTreeMap<String, String>,
-    _lock: File,
-}
-
-/// What a user accepts or asks for when a study is opened again.
-#[derive(Clone, Debug, Default)]
-pub struct OpenOptions {
-    /// Configuration keys, `specimen.NAME` or `code`, that may differ from what the study was begun
-    /// with.
-    pub accept: Vec<String>,
+    /// The journal of this attempt, which tells others that it lives.
+    journal: Writer,
 }
 
 /// Which rows are made again although they are there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Redo {
     Nothing,
-    /// Those that failed or were set aside.
+    /// Those that failed or crashed.
     Failed,
 }
 
-/// The numbers at the end of a run.
+impl Redo {
+    /// True when a row does not count as done.
+    pub fn wants(self, row: &Row) -> bool {
+        self == Self::Failed && row.text("status") != COMPLETE
+    }
+}
+
+/// Numbers of registrations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Outcome {
-    pub ending: Ending,
-    /// Registrations of the plan.
+pub struct Counts {
     pub planned: usize,
     /// Of them, with a row.
     pub done: usize,
-    /// Of those, failed or set aside.
+    /// Of those, failed or crashed.
     pub failed: usize,
 }
 
+/// What came of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Outcome {
+    pub ending: Ending,
+    /// Of this process' share.
+    pub share: Counts,
+    /// Of the whole study, by what was recorded when the run ended.
+    pub study: Counts,
+}
+
+/// Journals of dead attempts that one process seals while others wait for the lock.
+const SEALED_AT_ONCE: usize = 64;
+
 impl Study {
-    /// Opens the study of a configuration under `results`, or begins it. Fixes the process' level of
-    /// vector instructions to that of the study.
+    /// Begins an attempt at the study of a configuration under `results`; the study is begun with it when
+    /// it is not there. Fixes the process' level of vector instructions to that of the study.
     ///
     /// # Errors
-    /// When the folder cannot be used, another process has it, a specimen's file cannot be read, or
-    /// the study was begun with another configuration, other data or another program and that was
-    /// not accepted.
-    pub fn open(config: Config, results: &Path, options: &OpenOptions) -> Result<Self, StudyError> {
+    /// When the folder cannot be used, a living process has a part of the share, a specimen's file cannot
+    /// be read, or the study was begun with another configuration, other data or another program and
+    /// that was not accepted.
+    pub fn open(
+        config: Config,
+        results: &Path,
+        options: &OpenOptions,
+        threads: usize,
+    ) -> Result<Self, StudyError> {
         let folder = StudyFolder::of(results, &config.study.name);
+        for path in [folder.path().to_owned(), folder.logs()] {
+            std::fs::create_dir_all(&path).map_err(io("create", &path))?;
+        }
         let lock = folder.lock()?;
-        let (journals, specimens) = examine(&folder, &config, options)?;
-        let file = folder.config_file();
-        folder.write(&file, &config.to_toml())?;
+        crate::fail_point!("open.locked");
+        let found = examine(&folder, &config, options)?;
         let plan = Plan::of(&config);
-        let state = State::of(&journals);
+        check_free(&folder, &config, &plan, options.shard, &found.attempts)?;
+        let store = folder.store();
+        store.seal_dead(SEALED_AT_ONCE)?;
+        store.merge()?;
+        durable::remove_temporary_files(folder.path()).map_err(io("clean", folder.path()))?;
+        let text = config.to_toml();
+        let file = folder.config_file();
+        if std::fs::read_to_string(&file).ok().as_ref() != Some(&text) {
+            folder.write(&file, &text)?;
+        }
+        let next = found.attempts.last().map_or(1, |last| last.attempt + 1);
+        let provenance = Provenance::now(&config, found.specimens, threads);
+        let provenance = serde_json::to_value(provenance).expect("provenance is plain data");
+        let journal = Writer::create(&folder.journals(), next, options.shard.parts(), provenance)?;
+        crate::fail_point!("open.journal_made");
+        write_manifest(&folder, &config)?;
+        // From here on the journal keeps others off the share, and whoever had it before is over.
+        drop(lock);
+        let state = State::of(store.read()?)?;
         for (path, bytes) in &state.torn {
             tracing::warn!(
                 "{}: {bytes} bytes at its end could not be read; what they held is done again",
@@ -80,207 +116,232 @@ impl Study {
             folder,
             config,
             plan,
+            shard: options.shard,
             state,
-            specimens,
-            _lock: lock,
+            journal,
         })
     }
 
-    /// How many registrations a configuration plans, and how many of them would count as done if the
-    /// study were opened now. Makes, changes and claims nothing.
-    ///
-    /// # Errors
-    /// As [`Self::open`], but for the claim.
-    pub fn preview(
-        config: &Config,
-        results: &Path,
-        options: &OpenOptions,
-        redo: Redo,
-    ) -> Result<(usize, usize), StudyError> {
-        let folder = StudyFolder::of(results, &config.study.name);
-        let (journals, _) = examine(&folder, config, options)?;
-        let plan = Plan::of(config);
-        let (done, _) = counted(&plan, &State::of(&journals), redo);
-        Ok((plan.len(), done))
+    /// The number of this attempt, from 1.
+    pub fn attempt(&self) -> u32 {
+        self.journal.attempt()
     }
 
-    /// Does what is left, and writes the table and the manifest. Running again continues.
+    /// Does what is left of the share, seals the attempt, and writes the table when the whole study is
+    /// this process' or complete. Running again continues.
     ///
     /// # Errors
     /// When the journal or the table cannot be written; committed rows stay.
     pub fn run<W: Worker>(
-        &mut self,
+        mut self,
         worker: &W,
         redo: Redo,
         options: &RunOptions,
+        isolation: &dyn Isolation,
         events: &(dyn Fn(Event) + Sync),
     ) -> Result<Outcome, StudyError> {
-        let again = |row: &Row| redo == Redo::Failed && row.text("status") != COMPLETE;
-        let left = self.state.left(&self.plan, again);
-        let specimens = self.specimens.clone();
-        let provenance = Provenance::now(&self.config, specimens, options.threads);
-        let provenance = serde_json::to_value(provenance).expect("provenance is plain data");
-        let mut writer = Writer::create(&self.folder.journals(), provenance)?;
-        self.write_manifest()?;
-
-        let committed = Mutex::new(Vec::new());
-        let keep = |event: Event| {
-            if let Event::Row(row) = event {
-                let mut rows = committed.lock().expect("no thread panics while it pushes");
-                rows.push(row.clone());
-            }
-            events(event);
-        };
-        for mut row in left.set_aside_rows() {
-            let known = |key| {
-                self.state
-                    .row(&key)
-                    .is_some_and(|row| row.text("status") == SET_ASIDE)
-            };
-            if super::RegistrationKey::of_row(&row).is_some_and(known) {
-                continue;
-            }
-            row.set("attempt", writer.attempt());
-            writer.append(&Record::Row(Box::new(row.clone())))?;
-            keep(Event::Row(&row));
+        let left = self
+            .state
+            .left(&self.plan, self.shard, |row| redo.wants(row));
+        let ending = self.work(worker, left, options, isolation, events)?;
+        if ending != Ending::Left {
+            self.journal.append(&Record::Ended(End {
+                left: false,
+                peak_memory_bytes: peak_memory_bytes(),
+            }))?;
         }
-        let alone = RunOptions {
-            threads: 1,
-            cases_in_flight: 1,
-            ..*options
-        };
-        let mut ending = run(worker, left.suspects, &mut writer, &alone, &keep)?;
-        if ending == Ending::Done {
-            ending = run(worker, left.others, &mut writer, options, &keep)?;
+        self.journal.sync()?;
+        crate::fail_point!("run.ended");
+        let Self {
+            folder,
+            config,
+            plan,
+            shard,
+            journal,
+            ..
+        } = self;
+        let lock = folder.lock()?;
+        let (path, store) = (journal.path().to_owned(), folder.store());
+        drop(journal);
+        store.seal(&path)?;
+        store.merge()?;
+        write_manifest(&folder, &config)?;
+        let state = State::of(store.read()?)?;
+        let study = counts(&plan, &state, Shard::WHOLE);
+        if shard.is_whole() || study.done == study.planned {
+            write_table(&folder, &plan, &state)?;
         }
-        writer.append(&Record::Ended)?;
-        writer.sync()?;
-        drop(writer);
-        for row in committed.into_inner().expect("no thread panicked") {
-            self.state.insert(row);
-        }
-        write_table(&self.folder, &self.plan, &self.state)?;
-        self.write_manifest()?;
-        Ok(self.outcome(ending))
-    }
-
-    /// How many registrations of the plan count as done, and how many of those failed.
-    pub fn counted(&self, redo: Redo) -> (usize, usize) {
-        counted(&self.plan, &self.state, redo)
-    }
-
-    fn outcome(&self, ending: Ending) -> Outcome {
-        let (done, failed) = self.counted(Redo::Nothing);
-        Outcome {
+        drop(lock);
+        Ok(Outcome {
             ending,
-            planned: self.plan.len(),
-            done,
-            failed,
+            share: counts(&plan, &state, shard),
+            study,
+        })
+    }
+
+    fn work<W: Worker>(
+        &mut self,
+        worker: &W,
+        left: Left,
+        options: &RunOptions,
+        isolation: &dyn Isolation,
+        events: &(dyn Fn(Event) + Sync),
+    ) -> Result<Ending, StudyError> {
+        let attempt = self.journal.attempt();
+        let journal = &mut self.journal;
+        let mut commit = |record: Record| {
+            let record = match record {
+                Record::Row(mut row) => {
+                    row.set("attempt", attempt);
+                    Record::Row(row)
+                }
+                other => other,
+            };
+            journal.append(&record)?;
+            if let Record::Row(row) = &record {
+                events(Event::Row(row));
+            }
+            Ok(())
+        };
+        for row in left.crashed {
+            commit(Record::Row(Box::new(row)))?;
         }
+        let mut others = left.others;
+        if !left.suspects.is_empty() {
+            let verdict = try_suspects(
+                isolation,
+                left.suspects,
+                options.threads,
+                options.stop,
+                &mut commit,
+            )
+            .map_err(|broken| match broken {
+                Broken::Journal(error) => StudyError::Journal(error),
+                Broken::Process(problem) => StudyError::Isolation(problem),
+            })?;
+            for (case, how) in &verdict.crashed_cases {
+                for work in others.iter().filter(|work| work.case == *case) {
+                    for key in &work.registrations {
+                        commit(Record::Row(Box::new(crashed_row(key, true, how))))?;
+                    }
+                }
+                others.retain(|work| work.case != *case);
+            }
+            if verdict.stopped {
+                return Ok(Ending::Stopped);
+            }
+        }
+        if options.stop.forbids(Duration::ZERO) && !others.is_empty() {
+            return Ok(Ending::Stopped);
+        }
+        Ok(run(
+            worker,
+            others,
+            attempt,
+            &mut self.journal,
+            options,
+            events,
+        )?)
     }
 
-    /// `manifest.json`: the provenance of every attempt, from their journals.
-    fn write_manifest(&self) -> Result<(), StudyError> {
-        let journals = journal::read_all(&self.folder.journals())?;
-        let attempts: Vec<Value> = journals
-            .iter()
-            .filter_map(|journal| {
-                let header = journal.header.as_ref()?;
-                let is_row = |record: &&Record| matches!(record, Record::Row(_));
-                Some(json!({
-                    "attempt": header.attempt,
-                    "provenance": header.provenance,
-                    "rows": journal.records.iter().filter(is_row).count(),
-                    "ended_in_order": journal.ended(),
-                    "unreadable_bytes": journal.torn_bytes,
-                }))
-            })
-            .collect();
-        let manifest = json!({
-            "format": 1,
-            "study": self.config.study.name,
-            "attempts": attempts,
-        });
-        let text = serde_json::to_string_pretty(&manifest).expect("JSON is text") + "\n";
-        self.folder.write(&self.folder.manifest(), &text)
+    /// The registrations of this process' share, and how many of them count as done.
+    pub fn counts(&self, redo: Redo) -> Counts {
+        counts_with(&self.plan, &self.state, self.shard, redo)
     }
 }
 
-fn counted(plan: &Plan, state: &State, redo: Redo) -> (usize, usize) {
-    let rows = || state.planned_rows(plan);
-    let failed = rows().filter(|row| row.text("status") != COMPLETE).count();
-    match redo {
-        Redo::Nothing => (rows().count(), failed),
-        Redo::Failed => (rows().count() - failed, 0),
-    }
-}
-
-/// The journals of a study that may go on with this configuration, and the fingerprints of its
-/// specimens. Fixes the process' level of vector instructions to that of the study.
-fn examine(
-    folder: &StudyFolder,
+/// How many registrations a share has, and how many of them would count as done if the study were opened
+/// now. Makes, changes and claims nothing.
+///
+/// # Errors
+/// As [`Study::open`].
+pub fn preview(
     config: &Config,
+    results: &Path,
     options: &OpenOptions,
-) -> Result<(Vec<Journal>, BTreeMap<String, String>), StudyError> {
-    let journals = journal::read_all(&folder.journals())?;
-    select_simd(&journals)?;
-    let specimens = fingerprints(&config.population)?;
-    check_unchanged(folder, config, &specimens, &provenances(&journals), options)?;
-    Ok((journals, specimens))
+    redo: Redo,
+) -> Result<Counts, StudyError> {
+    let folder = StudyFolder::of(results, &config.study.name);
+    let found = examine(&folder, config, options)?;
+    let plan = Plan::of(config);
+    check_free(&folder, config, &plan, options.shard, &found.attempts)?;
+    let state = State::of(folder.store().read()?)?;
+    Ok(counts_with(&plan, &state, options.shard, redo))
 }
 
-fn check_unchanged(
-    folder: &StudyFolder,
-    config: &Config,
-    specimens: &BTreeMap<String, String>,
-    earlier: &[Provenance],
-    options: &OpenOptions,
-) -> Result<(), StudyError> {
-    let (mut differences, mut keys) = (Vec::new(), Vec::new());
-    let file = folder.config_file();
-    if !earlier.is_empty() && file.is_file() {
-        let text = std::fs::read_to_string(&file).map_err(io("read", &file))?;
-        let before = Config::parse(&text, &file, &|_| None)?;
-        for difference in before.differences(config) {
-            differences.push(difference.to_string());
-            keys.push(difference.key);
-        }
-    }
-    for (name, now) in specimens {
-        let last = earlier.iter().rev().find_map(|p| p.specimens.get(name));
-        if let Some(before) = last
-            && before != now
-        {
-            let short = |hash: &str| hash.chars().take(12).collect::<String>();
-            let key = format!("specimen.{name}");
-            differences.push(format!(
-                "  {key}: was data of fingerprint {}, is {}: its files were changed",
-                short(before),
-                short(now)
-            ));
-            keys.push(key);
-        }
-    }
-    let code = env!("PAO_SIM_CODE_HASH");
-    if let Some(last) = earlier.last()
-        && last.code != code
-    {
-        differences.push(format!(
-            "  code: was {} of version {} (commit {}), is {code} of version {} (commit {})",
-            last.code,
-            last.version,
-            last.commit,
-            env!("CARGO_PKG_VERSION"),
-            env!("PAO_SIM_COMMIT")
-        ));
-        keys.push("code".into());
-    }
-    if keys.iter().all(|key| options.accept.contains(key)) {
+/// Throws a study away: all that is in its folder. `name` must be the study's name when rows would be
+/// lost, so that nobody does it by a slip.
+///
+/// # Errors
+/// When rows would be lost and the name is not given, when a process works on the study, or the
+/// folder cannot be removed.
+pub fn throw_away(config: &Config, results: &Path, name: &str) -> Result<(), StudyError> {
+    let folder = StudyFolder::of(results, &config.study.name);
+    if !folder.path().is_dir() {
         return Ok(());
     }
-    Err(StudyError::Mixed {
-        path: folder.path().to_owned(),
-        differences,
-        keys,
-    })
+    let lock = folder.lock()?;
+    let attempts = folder.store().attempts()?;
+    check_free(&folder, config, &Plan::of(config), Shard::WHOLE, &attempts)?;
+    // What is damaged, in conflict or foreign may be thrown away too.
+    let rows = folder.store().read().map_or(0, |ledger| ledger.rows.len());
+    if rows > 0 && name != config.study.name {
+        return Err(StudyError::Guarded {
+            path: folder.path().to_owned(),
+            name: config.study.name.clone(),
+            rows,
+            attempts: attempts.len(),
+        });
+    }
+    // In one step, so that a half removed study is never taken for a whole one.
+    let gone = results.join(format!(
+        ".thrown-away-{}-{}",
+        config.study.name,
+        std::process::id()
+    ));
+    std::fs::rename(folder.path(), &gone).map_err(io("move away", folder.path()))?;
+    drop(lock);
+    std::fs::remove_dir_all(&gone).map_err(io("remove", &gone))
+}
+
+fn counts(plan: &Plan, state: &State, shard: Shard) -> Counts {
+    counts_with(plan, state, shard, Redo::Nothing)
+}
+
+fn counts_with(plan: &Plan, state: &State, shard: Shard, redo: Redo) -> Counts {
+    let rows = || state.rows_of(plan, shard).filter(|row| !redo.wants(row));
+    Counts {
+        planned: shard.cases(plan).count() * plan.registrations_per_case(),
+        done: rows().count(),
+        failed: rows().filter(|row| row.text("status") != COMPLETE).count(),
+    }
+}
+
+/// `manifest.json`: the provenance of every attempt, from their records.
+fn write_manifest(folder: &StudyFolder, config: &Config) -> Result<(), StudyError> {
+    let attempts: Vec<Value> = folder
+        .store()
+        .attempts()?
+        .iter()
+        .map(|attempt| {
+            let shard = Shard::new(attempt.share.0, attempt.share.1);
+            json!({
+                "attempt": attempt.attempt,
+                "shard": shard.map(|shard| shard.to_string()),
+                "provenance": attempt.provenance,
+                "running": attempt.alive,
+                "rows": (!attempt.alive).then_some(attempt.rows),
+                "ended_in_order": attempt.end.is_some(),
+                "peak_memory_bytes": attempt.end.as_ref().and_then(|end| end.peak_memory_bytes),
+                "unreadable_bytes": attempt.unreadable_bytes,
+            })
+        })
+        .collect();
+    let manifest = json!({
+        "format": FORMAT,
+        "study": config.study.name,
+        "attempts": attempts,
+    });
+    let text = serde_json::to_string_pretty(&manifest).expect("JSON is text") + "\n";
+    folder.write(&folder.manifest(), &text)
 }

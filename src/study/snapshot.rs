@@ -3,7 +3,7 @@
 use super::folder::{StudyError, StudyFolder};
 use super::{Config, Plan, Provenance, State};
 use crate::simd::SimdLevel;
-use crate::store::{Journal, Row, journal, write_parquet};
+use crate::store::{Attempt, Row, write_parquet};
 
 /// Configuration, plan and rows of a study at one moment, while others may work on it.
 #[derive(Debug)]
@@ -12,7 +12,6 @@ pub struct Snapshot {
     pub config: Config,
     pub plan: Plan,
     pub state: State,
-    pub journals: Vec<Journal>,
 }
 
 impl Snapshot {
@@ -22,13 +21,12 @@ impl Snapshot {
     /// When its configuration or journals cannot be read.
     pub fn read(folder: StudyFolder) -> Result<Self, StudyError> {
         let config = Config::read(&folder.config_file())?;
-        let journals = journal::read_all(&folder.journals())?;
+        let state = State::of(folder.store().read()?)?;
         Ok(Self {
             plan: Plan::of(&config),
-            state: State::of(&journals),
+            state,
             folder,
             config,
-            journals,
         })
     }
 
@@ -37,6 +35,7 @@ impl Snapshot {
     /// # Errors
     /// When it cannot be written.
     pub fn write_table(&self) -> Result<(), StudyError> {
+        let _lock = self.folder.lock()?;
         write_table(&self.folder, &self.plan, &self.state)
     }
 
@@ -46,7 +45,7 @@ impl Snapshot {
     /// # Errors
     /// When the processor lacks it.
     pub fn select_simd(&self) -> Result<(), StudyError> {
-        select_simd(&self.journals)
+        select_simd(&self.state.attempts)
     }
 }
 
@@ -60,19 +59,20 @@ pub(super) fn write_table(
     Ok(write_parquet(&folder.table(), &rows)?)
 }
 
-/// The provenance of each attempt that has one, oldest first.
-pub(super) fn provenances(journals: &[Journal]) -> Vec<Provenance> {
-    let headers = journals
-        .iter()
-        .filter_map(|journal| journal.header.as_ref());
-    headers
-        .filter_map(|header| serde_json::from_value(header.provenance.clone()).ok())
+/// The provenance of each attempt that has one of today's form, oldest first.
+pub(super) fn provenances(attempts: &[Attempt]) -> Vec<Provenance> {
+    let found = attempts.iter();
+    found
+        .filter_map(|attempt| serde_json::from_value(attempt.provenance.clone()).ok())
         .collect()
 }
 
-/// Fixes the level of vector instructions to that of the first attempt.
-pub(super) fn select_simd(journals: &[Journal]) -> Result<(), StudyError> {
-    match provenances(journals).first() {
+/// Fixes the process' level of vector instructions to that of the first attempt.
+///
+/// # Errors
+/// When the processor lacks it, or another level is in use already.
+pub fn select_simd(attempts: &[Attempt]) -> Result<(), StudyError> {
+    match provenances(attempts).first() {
         Some(first) => Ok(SimdLevel::select(first.simd)?),
         None => Ok(()),
     }

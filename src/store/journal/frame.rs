@@ -1,7 +1,7 @@
 //! Frames: length, kind, payload, checksum.
 
 /// Opens every journal; the last byte is the format's version.
-pub(super) const MAGIC: [u8; 8] = *b"PAO-SIM\x01";
+pub(super) const MAGIC: [u8; 8] = *b"PAO-SIM\x02";
 
 /// Bytes of a frame around its payload.
 const OVERHEAD: usize = 4 + 1 + 4;

@@ -2,8 +2,9 @@
 
 use super::JournalError;
 use super::frame::{self, MAGIC};
-use super::record::{HEADER, Header, Record};
-use crate::store::schema::SCHEMA;
+use super::record::{End, HEADER, Header, Record};
+use crate::store::schema::{Kind, SCHEMA};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// What a journal holds.
@@ -21,9 +22,12 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// True when the attempt waited for whatever it had begun.
-    pub fn ended(&self) -> bool {
-        self.records.last() == Some(&Record::Ended)
+    /// How the attempt ended, if it did so in order.
+    pub fn end(&self) -> Option<&End> {
+        match self.records.last() {
+            Some(Record::Ended(end)) => Some(end),
+            _ => None,
+        }
     }
 }
 
@@ -66,7 +70,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Journal, JournalError> 
     let header: Header = serde_json::from_slice(payload)
         .map_err(|error| foreign(format!("its header cannot be read ({error})")))?;
     position += length;
-    let columns = places(&header).map_err(foreign)?;
+    let columns = places(&header.columns).map_err(foreign)?;
     while let Some((kind, payload, length)) = frame::read(&bytes[position..]) {
         // A whole frame that makes no sense was not torn: it is another version's.
         let record = Record::decode(kind, payload, &columns).ok_or_else(|| {
@@ -83,16 +87,42 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Journal, JournalError> 
     Ok(journal)
 }
 
-/// Today's places of a journal's columns. A column that is new since then stays empty; one that is
-/// gone or holds another kind cannot be read.
-fn places(header: &Header) -> Result<Vec<usize>, String> {
+/// Today's places of stored columns. A column that is new since then stays empty; one that is gone or
+/// holds another kind cannot be read.
+pub(in crate::store) fn places(columns: &[(String, Kind)]) -> Result<Vec<usize>, String> {
     let place = |(name, kind): &(String, _)| match SCHEMA.place(name) {
         Some(place) if SCHEMA.columns[place].kind == *kind => Ok(place),
         _ => Err(format!(
             "it has a column {name} ({kind:?}) that is not known"
         )),
     };
-    header.columns.iter().map(place).collect()
+    columns.iter().map(place).collect()
+}
+
+/// Reads the header of a journal alone; `None` when its attempt ended before it had written one.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_header(path: &Path) -> Result<Option<Header>, JournalError> {
+    let io = |cause| JournalError::Io {
+        action: "read",
+        path: path.to_owned(),
+        cause,
+    };
+    let mut file = std::fs::File::open(path).map_err(io)?;
+    let mut start = Vec::new();
+    let opening = MAGIC.len() as u64 + 4;
+    (&mut file)
+        .take(opening)
+        .read_to_end(&mut start)
+        .map_err(io)?;
+    if let Some(Ok(length)) = start.get(MAGIC.len()..).map(<[u8; 4]>::try_from) {
+        // The rest of the header's frame: kind, payload and checksum.
+        file.take(u64::from(u32::from_le_bytes(length)) + 5)
+            .read_to_end(&mut start)
+            .map_err(io)?;
+    }
+    Ok(parse(&start, path)?.header)
 }
 
 /// Reads every journal of a folder in the order of their numbers. A folder that is not there holds
@@ -108,7 +138,7 @@ pub fn read_all(folder: &Path) -> Result<Vec<Journal>, JournalError> {
 }
 
 /// The journals of a folder with their numbers, ascending.
-pub(super) fn numbered(folder: &Path) -> Result<Vec<(u32, PathBuf)>, JournalError> {
+pub(in crate::store) fn numbered(folder: &Path) -> Result<Vec<(u32, PathBuf)>, JournalError> {
     let failed = |cause| JournalError::Io {
         action: "list",
         path: folder.to_owned(),

@@ -8,7 +8,7 @@ use crate::store::durable::sync_folder;
 use std::fs::{File, OpenOptions};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 /// The journal of the running attempt. A record that [`Writer::append`] has taken survives the end of
 /// the process; it survives the end of the machine once it is synced, at most [`SYNC_EVERY`] later
@@ -22,45 +22,56 @@ pub struct Writer {
     length: u64,
     synced: u64,
     last_sync: Instant,
+    last_sign: Instant,
 }
 
 /// How long a record may wait for the disk.
 pub const SYNC_EVERY: Duration = Duration::from_secs(2);
+/// How often a journal to which nothing is written is touched, as a sign that its attempt lives.
+const SIGN_EVERY: Duration = Duration::from_secs(30);
 
 impl Writer {
-    /// Opens the journal of a new attempt: the next free number of `folder`, which is made if it is
-    /// not there. Several processes may do this at once.
+    /// Opens the journal of a new attempt: the first free number of `folder` from `first` on. The folder
+    /// is made if it is not there. Several processes may do this at once. The journal stays locked
+    /// as long as the writer lives, which tells others that the attempt does.
     ///
     /// # Errors
     /// When the folder or file cannot be written.
-    pub fn create(folder: &Path, provenance: serde_json::Value) -> Result<Self, JournalError> {
+    pub fn create(
+        folder: &Path,
+        first: u32,
+        share: (u32, u32),
+        provenance: serde_json::Value,
+    ) -> Result<Self, JournalError> {
         std::fs::create_dir_all(folder).map_err(io("create", folder))?;
-        let mut attempt = numbered(folder)?.last().map_or(1, |(number, _)| number + 1);
+        let mut attempt = numbered(folder)?
+            .last()
+            .map_or(first, |(number, _)| first.max(number + 1));
         loop {
             let path = folder.join(format!("{attempt:04}.journal"));
             match OpenOptions::new().append(true).create_new(true).open(&path) {
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => attempt += 1,
                 Err(cause) => return Err(io("create", &path)(cause)),
-                Ok(file) => return Self::begin(file, path, attempt, provenance),
+                Ok(file) => {
+                    return Self::begin(file, path, Header::new(attempt, share, provenance));
+                }
             }
         }
     }
 
-    fn begin(
-        file: File,
-        path: PathBuf,
-        attempt: u32,
-        provenance: serde_json::Value,
-    ) -> Result<Self, JournalError> {
+    fn begin(file: File, path: PathBuf, header: Header) -> Result<Self, JournalError> {
+        // Whoever looks whether it is locked holds it for a moment only. On a file system without locks
+        // the time of the last change tells that the attempt lives.
+        let _ = file.lock();
         let mut writer = Self {
             file,
             path,
-            attempt,
+            attempt: header.attempt,
             length: 0,
             synced: 0,
             last_sync: Instant::now(),
+            last_sign: Instant::now(),
         };
-        let header = Header::new(attempt, provenance);
         let header = serde_json::to_vec(&header).expect("a header is plain data");
         let mut bytes = MAGIC.to_vec();
         frame::write(&mut bytes, HEADER, &header);
@@ -101,6 +112,11 @@ impl Writer {
         if self.synced < self.length && self.last_sync.elapsed() >= SYNC_EVERY {
             self.sync()?;
         }
+        if self.last_sign.elapsed() >= SIGN_EVERY {
+            self.last_sign = Instant::now();
+            let touched = self.file.set_modified(SystemTime::now());
+            touched.map_err(io("touch", &self.path))?;
+        }
         Ok(())
     }
 
@@ -116,6 +132,14 @@ impl Writer {
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<(), JournalError> {
+        #[cfg(feature = "fail-points")]
+        let bytes = {
+            let (half, rest) = bytes.split_at(bytes.len() / 2);
+            self.file.write_all(half).map_err(io("write", &self.path))?;
+            self.length += half.len() as u64;
+            crate::fail_point!("journal.half_written");
+            rest
+        };
         if let Err(cause) = self.file.write_all(bytes) {
             // What was written of it would hide every record behind it. When cutting it off fails
             // too, the reader still finds the whole records before it.
@@ -138,7 +162,8 @@ fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Journ
 
 #[cfg(test)]
 mod tests {
-    use super::super::read::{parse, read, read_all};
+    use super::super::read::{parse, read, read_all, read_header};
+    use super::super::record::End;
     use super::*;
     use crate::store::Row;
     use serde_json::json;
@@ -159,13 +184,17 @@ mod tests {
             Record::Finished("phantom-1/left/f00/m00".into()),
             row(1),
             row(2),
-            Record::Ended,
+            Record::Crashed {
+                key: "phantom-1/left/f00/m01".into(),
+                how: "signal 11".into(),
+            },
+            Record::Ended(End::default()),
         ]
     }
 
     /// Writes the records and gives the length of the file after each of them, the header first.
     fn written(folder: &Path) -> (PathBuf, Vec<u64>) {
-        let mut writer = Writer::create(folder, json!({"host": "here"})).unwrap();
+        let mut writer = Writer::create(folder, 1, (0, 1), json!({"host": "here"})).unwrap();
         let mut lengths = vec![writer.length];
         for record in records() {
             writer.append(&record).unwrap();
@@ -182,8 +211,8 @@ mod tests {
         assert_eq!(journal.records, records());
         assert_eq!(journal.header.as_ref().unwrap().attempt, 1);
         assert_eq!(journal.header.as_ref().unwrap().provenance["host"], "here");
-        assert_eq!((journal.good_bytes, journal.torn_bytes), (lengths[6], 0));
-        assert!(journal.ended());
+        assert_eq!((journal.good_bytes, journal.torn_bytes), (lengths[7], 0));
+        assert_eq!(journal.end(), Some(&End::default()));
     }
 
     #[test]
@@ -200,6 +229,12 @@ mod tests {
             let good = whole.checked_sub(1).map_or(0, |last| lengths[last]);
             assert_eq!(journal.good_bytes, good, "cut at {length}");
             assert_eq!(journal.torn_bytes, length as u64 - good, "cut at {length}");
+            std::fs::write(&path, &bytes[..length]).unwrap();
+            assert_eq!(
+                read_header(&path).unwrap(),
+                journal.header,
+                "cut at {length}"
+            );
         }
     }
 
@@ -221,7 +256,7 @@ mod tests {
     fn attempts_are_numbered_and_read_in_order() {
         let folder = tempfile::tempdir().unwrap();
         for expected in 1..=3 {
-            let writer = Writer::create(folder.path(), json!({})).unwrap();
+            let writer = Writer::create(folder.path(), 1, (0, 1), json!({})).unwrap();
             assert_eq!(writer.attempt(), expected);
         }
         let all = read_all(folder.path()).unwrap();
@@ -237,14 +272,14 @@ mod tests {
     fn what_another_version_wrote_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("0001.journal");
-        std::fs::write(&path, b"PAO-SIM\x02and more").unwrap();
+        std::fs::write(&path, b"PAO-SIM\x07and more").unwrap();
         let message = read(&path).unwrap_err().to_string();
         assert!(
             message.contains("is no journal of this version"),
             "{message}"
         );
 
-        let mut header = Header::new(1, json!({}));
+        let mut header = Header::new(1, (0, 1), json!({}));
         header
             .columns
             .push(("colour".into(), crate::store::Kind::Text));
@@ -265,6 +300,7 @@ mod tests {
         let path = folder.path().join("0001.journal");
         let header = Header {
             attempt: 1,
+            share: (0, 1),
             columns: vec![
                 ("rotation_error_deg".into(), crate::store::Kind::Number),
                 ("specimen".into(), crate::store::Kind::Text),
