@@ -52,6 +52,15 @@ pub fn pass(name: &str) {
     }
 }
 
+/// Ends the process in the way of a crash when the environment names this registration
+/// (`PAO_SIM_ABORT_AT`).
+#[cfg(feature = "fail-points")]
+pub(crate) fn abort_at(key: &str) {
+    if std::env::var("PAO_SIM_ABORT_AT").is_ok_and(|wanted| wanted == key) {
+        std::process::abort();
+    }
+}
+
 /// As `kill -9` does: nothing is flushed, dropped or told.
 #[cfg(feature = "fail-points")]
 fn kill() -> ! {

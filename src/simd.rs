@@ -17,6 +17,27 @@ pub enum SimdLevel {
     Avx512,
 }
 
+/// The vector instructions of this processor that decide on its level.
+pub fn flags() -> Vec<String> {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::is_x86_feature_detected as has;
+        let all = [
+            ("avx2", has!("avx2")),
+            ("fma", has!("fma")),
+            ("avx512f", has!("avx512f")),
+            ("avx512bw", has!("avx512bw")),
+            ("avx512dq", has!("avx512dq")),
+            ("avx512vl", has!("avx512vl")),
+            ("avx512vnni", has!("avx512vnni")),
+        ];
+        let there = all.into_iter().filter(|(_, there)| *there);
+        there.map(|(name, _)| name.to_owned()).collect()
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    Vec::new()
+}
+
 /// A level could not be selected.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum SimdError {

@@ -84,6 +84,11 @@ impl Failure {
             eprintln!("{}", serde_json::json!({ "error": self.to_string() }));
         } else {
             eprintln!("error: {self}");
+            if self.is_full_disk() {
+                eprintln!(
+                    "free some space and run the same command again: what was committed is safe"
+                );
+            }
         }
         self.exit()
     }

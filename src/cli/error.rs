@@ -70,6 +70,22 @@ impl Failure {
     }
 }
 
+impl Failure {
+    /// True when a disk has no room left.
+    pub fn is_full_disk(&self) -> bool {
+        let mut cause: Option<&(dyn std::error::Error + 'static)> = Some(self);
+        while let Some(error) = cause {
+            if let Some(io) = error.downcast_ref::<std::io::Error>()
+                && io.kind() == std::io::ErrorKind::StorageFull
+            {
+                return true;
+            }
+            cause = error.source();
+        }
+        false
+    }
+}
+
 impl From<pao_sim::study::ConfigError> for Failure {
     fn from(error: pao_sim::study::ConfigError) -> Self {
         Self::Study(error.into())

@@ -3,7 +3,7 @@
 use super::args::Common;
 use super::error::{Exit, Failure};
 use super::output::say;
-use pao_sim::store::{COMPLETE, FAILED, Role, Row, SCHEMA, Value};
+use pao_sim::store::{COMPLETE, CRASHED, FAILED, Role, Row, SCHEMA, Value};
 use pao_sim::study::{self, CaseWorker, RegistrationKey, Snapshot, StudyFolder, Worker};
 use std::path::PathBuf;
 
@@ -24,6 +24,10 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         return Err(Failure::NotPlanned(key.to_string()));
     }
     snapshot.select_simd()?;
+    // Rows of other data or another program are no contradiction: say so before they are compared.
+    for change in snapshot.changes()? {
+        eprintln!("changed since the study ran:{change}");
+    }
     let row = make(&CaseWorker::new(&snapshot.config), &key);
     let before = snapshot.state.row(&key);
     let differences = before.map(|before| before.differences(&row));
@@ -34,6 +38,9 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     }
     match differences {
         None => eprintln!("the study has no row of this registration yet"),
+        Some(_) if before.is_some_and(|before| before.text("status") == CRASHED) => {
+            eprintln!("it was set aside because it ended its process; this time it did not");
+        }
         Some(differences) if differences.is_empty() => {
             eprintln!("equal to the study's row in every result, bit by bit");
         }

@@ -73,5 +73,6 @@ fn about(study: &Snapshot) -> About {
         reduced: section.reduced.clone(),
         seed: section.seed,
         planned,
+        provenance: study.provenance_summary(),
     }
 }

@@ -23,6 +23,8 @@ pub struct About {
     pub seed: u64,
     /// Planned registrations of each specimen and strategy.
     pub planned: BTreeMap<(String, String), usize>,
+    /// With what the rows were made: what, and its values.
+    pub provenance: Vec<(String, Vec<String>)>,
 }
 
 /// Rows of one kind of specimen and one strategy: they are never pooled with others.
@@ -80,6 +82,9 @@ pub fn write(rows: &Rows, about: &About, folder: &Path) -> Result<Vec<Group>, Re
             groups.push(group);
         }
     }
+    let provenance = provenance(about);
+    page += &provenance.markdown();
+    web += &html::table(&provenance);
     if let Some(failures) = failures(rows) {
         page += &failures.markdown();
         web += &html::table(&failures);
@@ -219,6 +224,20 @@ fn web_section(group: &Group, figures: &[&str], folder: &Path) -> Result<String,
     Ok(text)
 }
 
+/// With what the rows were made. No times: the same rows give the same report.
+fn provenance(about: &About) -> Table {
+    let rows = about.provenance.iter();
+    Table {
+        name: "provenance".into(),
+        title: "Provenance".into(),
+        header: vec!["what".into(), "value".into()],
+        rows: rows
+            .map(|(what, values)| vec![what.clone(), values.join(", ")])
+            .collect(),
+        notes: vec!["`manifest.json` has it by attempt.".into()],
+    }
+}
+
 /// How many registrations failed for which reason; none when all are complete.
 fn failures(rows: &Rows) -> Option<Table> {
     let mut reasons: BTreeMap<[&str; 3], usize> = BTreeMap::new();
@@ -345,6 +364,7 @@ mod tests {
             reduced: String::new(),
             seed: 7,
             planned: BTreeMap::from([(("phantom-1".into(), "paper".into()), 96)]),
+            provenance: vec![("commit".into(), vec!["abc".into(), "def".into()])],
         };
         let folder = tempfile::tempdir().unwrap();
         let groups = write(&rows(), &about, folder.path()).unwrap();

@@ -143,6 +143,8 @@ impl Worker for CaseWorker {
         key: &RegistrationKey,
         row: &mut Row,
     ) -> Result<(), Failure> {
+        #[cfg(feature = "fail-points")]
+        crate::fail_point::abort_at(&key.to_string());
         let apex = self.config.movement.lce_apex;
         record::truth(case, apex, row)?;
         let pick = self.pick(case, key);

@@ -376,4 +376,86 @@ photons = 3
         let again = Config::parse(&written, Path::new("study.toml"), &|_| None).unwrap();
         assert_eq!(again, config, "{written}");
     }
+
+    mod fuzz {
+        use super::*;
+        use proptest::prelude::*;
+
+        fn pieces() -> impl Strategy<Value = String> {
+            let words = [
+                "[study]",
+                "[run]",
+                "[xray.c_arm]",
+                "[registration.a]",
+                "seed",
+                "name",
+                "threads",
+                "=",
+                ".",
+                "\"a\"",
+                "\"${HOME}/x\"",
+                "\"${\"",
+                "-1",
+                "1e400",
+                "nan",
+                "inf",
+                "[",
+                "]",
+                "{",
+                "}",
+                "\n",
+                "\"\"\"",
+                "'",
+                "#",
+                "\u{0}",
+                "1979-05-27",
+                "0x",
+                "true",
+                ",",
+                "method",
+                "\"paper\"",
+                "phantoms",
+                "sides",
+                "9223372036854775808",
+            ];
+            prop::collection::vec(prop::sample::select(words.to_vec()), 0..40)
+                .prop_map(|words| words.join(" "))
+        }
+
+        proptest! {
+            #![proptest_config(ProptestConfig::with_cases(400))]
+
+            /// Whatever is written, it is read or refused with lines of the file; nothing panics, and what
+            /// was read is in range and reads back as it was written out.
+            #[test]
+            fn anything_is_read_or_refused(text in pieces()) {
+                check(&text)?;
+            }
+
+            /// The paper's configuration, every key written out, with a few bytes changed.
+            #[test]
+            fn a_damaged_configuration_is_read_or_refused(
+                changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4)
+            ) {
+                let mut bytes = Config::parse("", Path::new("a.toml"), &|_| None).unwrap().to_toml().into_bytes();
+                for (place, byte) in changes {
+                    let place = place.index(bytes.len());
+                    bytes[place] = byte;
+                }
+                check(&String::from_utf8_lossy(&bytes))?;
+            }
+        }
+
+        fn check(text: &str) -> Result<(), TestCaseError> {
+            match Config::parse(text, Path::new("a.toml"), &|_| None) {
+                Ok(config) => {
+                    prop_assert!(config.problems().is_empty());
+                    let again = Config::parse(&config.to_toml(), Path::new("a.toml"), &|_| None);
+                    prop_assert_eq!(again.unwrap(), config);
+                }
+                Err(error) => prop_assert!(error.to_string().contains("a.toml"), "{}", error),
+            }
+            Ok(())
+        }
+    }
 }

@@ -1,11 +1,13 @@
 //! Configuration, plan, runner and resume of a study.
 
+pub mod calibration;
 pub mod case_worker;
 pub mod config;
 mod config_difference;
 mod config_errors;
 mod config_file;
 mod config_table;
+pub mod cost;
 #[cfg(test)]
 mod engine_tests;
 pub mod fingerprint;

@@ -83,7 +83,7 @@ fn check_format(folder: &StudyFolder) -> Result<(), StudyError> {
 }
 
 /// What differs from what the study was begun with: a key that may be accepted, and a line for people.
-fn changes(
+pub(super) fn changes(
     folder: &StudyFolder,
     config: &Config,
     specimens: &BTreeMap<String, String>,

@@ -28,6 +28,15 @@ pub struct Provenance {
     pub platform: String,
     /// Model of the processor, where the system tells it.
     pub cpu: String,
+    /// Vector instructions of the processor that the program looks for.
+    #[serde(default)]
+    pub cpu_flags: Vec<String>,
+    /// What scored the candidates: `cpu`.
+    #[serde(default)]
+    pub backend: String,
+    /// GPU and driver, where one scored the candidates.
+    #[serde(default)]
+    pub gpu: Option<String>,
     pub threads: usize,
     /// Number of the process on its host.
     #[serde(default)]
@@ -61,6 +70,9 @@ impl Provenance {
             simd: SimdLevel::current(),
             host: first_line("/proc/sys/kernel/hostname").unwrap_or_else(|| "unknown".into()),
             platform: format!("{}-{}", std::env::consts::OS, std::env::consts::ARCH),
+            cpu_flags: crate::simd::flags(),
+            backend: "cpu".into(),
+            gpu: None,
             cpu: cpu_model().unwrap_or_else(|| "unknown".into()),
             threads,
             process: std::process::id(),

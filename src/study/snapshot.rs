@@ -1,9 +1,12 @@
 //! A study as its folder has it, without a claim on it.
 
+use super::fingerprint::fingerprints;
 use super::folder::{StudyError, StudyFolder};
+use super::opening::changes;
 use super::{Config, Plan, Provenance, State};
 use crate::simd::SimdLevel;
 use crate::store::{Attempt, Row, write_parquet};
+use std::collections::BTreeSet;
 
 /// Configuration, plan and rows of a study at one moment, while others may work on it.
 #[derive(Debug)]
@@ -37,6 +40,45 @@ impl Snapshot {
     pub fn write_table(&self) -> Result<(), StudyError> {
         let _lock = self.folder.lock()?;
         write_table(&self.folder, &self.plan, &self.state)
+    }
+
+    /// With what the rows were made, each different value once: what, and its values, sorted.
+    pub fn provenance_summary(&self) -> Vec<(String, Vec<String>)> {
+        let with_rows = self.state.attempts.iter().filter(|a| a.rows > 0 || a.alive);
+        let all = provenances(&with_rows.cloned().collect::<Vec<_>>());
+        let mut summary: Vec<(String, BTreeSet<String>)> = Vec::new();
+        let mut add = |what: &str, of: &dyn Fn(&Provenance) -> Vec<String>| {
+            let values = all.iter().flat_map(of).collect();
+            summary.push((what.to_owned(), values));
+        };
+        add("version of the program", &|p| vec![p.version.clone()]);
+        add("commit", &|p| vec![p.commit.clone()]);
+        add("hash of the sources", &|p| vec![p.code.clone()]);
+        add("hash of the configuration", &|p| vec![p.config.clone()]);
+        add("fingerprints of specimens", &|p| {
+            let pairs = p.specimens.iter();
+            pairs.map(|(name, hash)| format!("{name} {hash}")).collect()
+        });
+        add("vector instructions", &|p| vec![p.simd.name().into()]);
+        add("backend", &|p| vec![p.backend.clone()]);
+        add("GPU and driver", &|p| p.gpu.iter().cloned().collect());
+        add("platform", &|p| vec![p.platform.clone()]);
+        add("processor", &|p| vec![p.cpu.clone()]);
+        let filled = summary.into_iter().filter(|(_, values)| !values.is_empty());
+        filled
+            .map(|(what, values)| (what, values.into_iter().collect()))
+            .collect()
+    }
+
+    /// What has changed since the study's last attempt, a line each: data of specimens, the program.
+    ///
+    /// # Errors
+    /// When a specimen's file cannot be read.
+    pub fn changes(&self) -> Result<Vec<String>, StudyError> {
+        let specimens = fingerprints(&self.config.population)?;
+        let earlier = provenances(&self.state.attempts);
+        let changes = changes(&self.folder, &self.config, &specimens, &earlier)?;
+        Ok(changes.into_iter().map(|(_, line)| line).collect())
     }
 
     /// Fixes the process' level of vector instructions to that of the study, so that what is

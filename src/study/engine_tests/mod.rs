@@ -1,6 +1,7 @@
 //! The engine with a worker that takes no time: runs, stops, kills and continuations.
 
 mod deaths;
+mod decisions;
 mod resuming;
 mod shares;
 
