@@ -83,7 +83,7 @@ pub fn write(rows: &Rows, about: &About, folder: &Path) -> Result<Vec<Group>, Re
         }
     }
     let provenance = provenance(about);
-    page += &provenance.markdown();
+    page += &(provenance.markdown() + "\n");
     web += &html::table(&provenance);
     if let Some(failures) = failures(rows) {
         page += &failures.markdown();

@@ -57,7 +57,9 @@ pub fn read(path: &Path) -> Result<Part, PartError> {
     })
 }
 
-fn open(path: &Path) -> Result<(ParquetReader<Cursor<Vec<u8>>>, About), PartError> {
+type Reader = ParquetReader<Cursor<Vec<u8>>>;
+
+fn open(path: &Path) -> Result<(Reader, About), PartError> {
     let damaged = |problem: String| PartError::Damaged {
         path: path.to_owned(),
         problem,

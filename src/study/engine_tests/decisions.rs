@@ -148,7 +148,7 @@ fn prepare(results: &Path, before: &[Before], code: &str) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
+    #![proptest_config(ProptestConfig::with_cases(48))]
 
     #[test]
     fn what_is_done_is_what_the_table_says(

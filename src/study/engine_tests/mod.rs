@@ -9,8 +9,8 @@ use super::isolation::{Fate, Isolation};
 use super::*;
 use crate::store::{CRASHED, FAILED, Record, Role, Row, SCHEMA, Value};
 use std::path::Path;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{LazyLock, Mutex};
 
 const STUDY: &str = "
 [study]
@@ -203,9 +203,13 @@ fn promised(rows: &[Row]) -> Vec<String> {
     rows.iter().map(text).collect()
 }
 
+/// The rows of one undisturbed run.
 fn whole_run() -> Vec<String> {
-    let results = tempfile::tempdir().unwrap();
-    let outcome = run_with(results.path(), &Fake::default(), 1, Redo::Nothing);
-    assert_eq!((outcome.study.done, outcome.study.failed), (ROWS, 0));
-    promised(&rows(results.path()))
+    static ROWS_OF_IT: LazyLock<Vec<String>> = LazyLock::new(|| {
+        let results = tempfile::tempdir().unwrap();
+        let outcome = run_with(results.path(), &Fake::default(), 1, Redo::Nothing);
+        assert_eq!((outcome.study.done, outcome.study.failed), (ROWS, 0));
+        promised(&rows(results.path()))
+    });
+    ROWS_OF_IT.clone()
 }

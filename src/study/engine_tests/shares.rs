@@ -8,7 +8,7 @@ fn share(text: &str) -> Shard {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+    #![proptest_config(ProptestConfig::with_cases(16))]
 
     /// Whatever number of shares and threads each submission has, whatever was stopped before: the rows
     /// are those of one undisturbed run, and none is made twice.
