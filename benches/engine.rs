@@ -27,7 +27,7 @@ fn main() {
     let begin = Instant::now();
     let outcome = noop::run_share(&config, results, Shard::WHOLE, 2, Duration::ZERO).expect("runs");
     let seconds = begin.elapsed().as_secs_f64();
-    let count = outcome.study.done;
+    let count = outcome.share.done;
     println!("{count} rows, one process of 2 threads");
     println!(
         "run, table included      {seconds:8.2} s, {:.3} ms a row",

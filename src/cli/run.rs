@@ -117,7 +117,9 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     });
     progress.finish();
     let outcome = outcome?;
-    let whole = outcome.study.done == outcome.study.planned;
+    let whole = outcome
+        .study
+        .is_some_and(|study| study.done == study.planned);
     if shard.is_whole() || whole {
         // The report reads the records as anybody else does.
         pao_sim::fail_point!("report.begun");
@@ -169,20 +171,22 @@ fn tell(folder: &Path, shard: Shard, outcome: &Outcome, common: &Common) {
         0 => String::new(),
         _ => format!(", {failed} failed (pao-sim status {folder_name} --failures)"),
     };
-    let study = outcome.study;
-    if study.done == study.planned {
-        let report = folder.join("report/report.html");
-        eprintln!(
-            "complete: {} of {} registrations{failures}; the report is {}",
-            study.done,
-            study.planned,
-            report.display()
-        );
-    } else {
-        eprintln!(
-            "share {shard} is done: {done} of {planned} registrations{failures}; of the whole study {} of {} are: pao-sim status {folder_name}",
-            study.done, study.planned
-        );
+    match outcome.study {
+        Some(study) if study.done == study.planned => {
+            let report = folder.join("report/report.html");
+            eprintln!(
+                "complete: {} of {} registrations{failures}; the report is {}",
+                study.done,
+                study.planned,
+                report.display()
+            );
+        }
+        _ => {
+            let (recorded, all) = outcome.recorded;
+            eprintln!(
+                "share {shard} is done: {done} of {planned} registrations{failures}; the whole study has {recorded} of {all}: pao-sim status {folder_name}"
+            );
+        }
     }
 }
 

@@ -12,6 +12,7 @@ use crate::store::journal::Writer;
 use crate::store::{COMPLETE, End, Record, Row, durable};
 use serde_json::{Value, json};
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 /// A study of which this process has a share.
@@ -58,8 +59,10 @@ pub struct Outcome {
     pub ending: Ending,
     /// Of this process' share.
     pub share: Counts,
-    /// Of the whole study, by what was recorded when the run ended.
-    pub study: Counts,
+    /// Of the whole study; `None` for a share while rows of other shares are missing.
+    pub study: Option<Counts>,
+    /// Rows of all attempts that are over, and registrations of the whole study.
+    pub recorded: (usize, usize),
 }
 
 /// Journals of dead attempts that one process seals while others wait for the lock.
@@ -105,7 +108,8 @@ impl Study {
         write_manifest(&folder, &config)?;
         // From here on the journal keeps others off the share, and whoever had it before is over.
         drop(lock);
-        let state = State::of(store.read()?)?;
+        let mut state = State::of(store.read()?)?;
+        state.keep_only(&plan, options.shard);
         for (path, bytes) in &state.torn {
             tracing::warn!(
                 "{}: {bytes} bytes at its end could not be read; what they held is done again",
@@ -143,7 +147,15 @@ impl Study {
         let left = self
             .state
             .left(&self.plan, self.shard, |row| redo.wants(row));
-        let ending = self.work(worker, left, options, isolation, events)?;
+        let committed = Mutex::new(Vec::new());
+        let keep = |event: Event| {
+            if let Event::Row(row) = event {
+                let mut rows = committed.lock().unwrap_or_else(PoisonError::into_inner);
+                rows.push(row.clone());
+            }
+            events(event);
+        };
+        let ending = self.work(worker, left, options, isolation, &keep)?;
         if ending != Ending::Left {
             self.journal.append(&Record::Ended(End {
                 left: false,
@@ -157,8 +169,8 @@ impl Study {
             config,
             plan,
             shard,
+            mut state,
             journal,
-            ..
         } = self;
         let lock = folder.lock()?;
         let (path, store) = (journal.path().to_owned(), folder.store());
@@ -166,16 +178,30 @@ impl Study {
         store.seal(&path)?;
         store.merge()?;
         write_manifest(&folder, &config)?;
-        let state = State::of(store.read()?)?;
-        let study = counts(&plan, &state, Shard::WHOLE);
-        if shard.is_whole() || study.done == study.planned {
-            write_table(&folder, &plan, &state)?;
-        }
+        let recorded: usize = store.attempts()?.iter().map(|a| a.rows).sum();
+        // Reading every row is worth it only when the study may be complete.
+        let study = if shard.is_whole() || recorded >= plan.len() {
+            state = State::of(store.read()?)?;
+            let study = counts(&plan, &state, Shard::WHOLE);
+            if shard.is_whole() || study.done == study.planned {
+                write_table(&folder, &plan, &state)?;
+            }
+            Some(study)
+        } else {
+            for row in committed
+                .into_inner()
+                .unwrap_or_else(PoisonError::into_inner)
+            {
+                state.insert(row);
+            }
+            None
+        };
         drop(lock);
         Ok(Outcome {
             ending,
             share: counts(&plan, &state, shard),
             study,
+            recorded: (recorded, plan.len()),
         })
     }
 

@@ -98,6 +98,23 @@ impl State {
         Ok(())
     }
 
+    /// Takes in a row that was just committed.
+    pub fn insert(&mut self, row: Row) {
+        if let Some(key) = RegistrationKey::of_row(&row) {
+            self.rows.insert(key, row);
+        }
+    }
+
+    /// Forgets the rows of other shares: a process needs its own only.
+    pub fn keep_only(&mut self, plan: &Plan, shard: Shard) {
+        if !shard.is_whole() {
+            let own: std::collections::HashSet<&CaseKey> =
+                shard.cases(plan).map(|(_, case)| case).collect();
+            self.rows.retain(|key, _| own.contains(&key.case));
+            self.rows.shrink_to_fit();
+        }
+    }
+
     /// The row of a registration, if it was committed.
     pub fn row(&self, key: &RegistrationKey) -> Option<&Row> {
         self.rows.get(key)

@@ -35,7 +35,7 @@ fn suspects_run_apart_and_first_and_are_cleared() {
     die(results.path(), &[KEY, OTHER]);
     let fake = Fake::default();
     let outcome = run_with(results.path(), &fake, 4, Redo::Nothing);
-    assert_eq!((outcome.study.done, outcome.study.failed), (ROWS, 0));
+    assert_eq!((outcome.share.done, outcome.share.failed), (ROWS, 0));
     let processes = fake.processes.lock().unwrap();
     // In the order of the plan, and with all threads.
     assert_eq!(*processes, [(vec![OTHER.to_owned(), KEY.to_owned()], 4)]);
@@ -52,7 +52,7 @@ fn the_one_that_ends_its_process_alone_is_set_aside() {
         ..Fake::default()
     };
     let outcome = run_with(results.path(), &fake, 4, Redo::Nothing);
-    assert_eq!((outcome.study.done, outcome.study.failed), (ROWS, 1));
+    assert_eq!((outcome.share.done, outcome.share.failed), (ROWS, 1));
     // Both were in work when the first process died; then each had one of its own.
     let processes = fake.processes.lock().unwrap().clone();
     let threads: Vec<usize> = processes.iter().map(|(_, threads)| *threads).collect();
@@ -88,7 +88,7 @@ fn a_case_that_ends_its_process_is_set_aside_with_its_registrations() {
         ..Fake::default()
     };
     let outcome = run_with(results.path(), &fake, 2, Redo::Nothing);
-    assert_eq!((outcome.study.done, outcome.study.failed), (ROWS, 8));
+    assert_eq!((outcome.share.done, outcome.share.failed), (ROWS, 8));
     let crashed = by_status(results.path(), CRASHED);
     assert!(crashed.iter().all(|row| row.text("phase") == "simulation"));
 }
@@ -103,7 +103,7 @@ fn a_case_found_deadly_takes_the_others_along() {
         ..Fake::default()
     };
     let outcome = run_with(results.path(), &fake, 2, Redo::Nothing);
-    assert_eq!((outcome.study.done, outcome.study.failed), (ROWS, 8));
+    assert_eq!((outcome.share.done, outcome.share.failed), (ROWS, 8));
 }
 
 /// Being killed from outside, again and again, makes nobody guilty.
@@ -132,7 +132,7 @@ fn a_proof_without_its_row_is_enough() {
     drop(writer);
     let fake = Fake::default();
     let outcome = run_with(results.path(), &fake, 2, Redo::Nothing);
-    assert_eq!((outcome.study.done, outcome.study.failed), (ROWS, 1));
+    assert_eq!((outcome.share.done, outcome.share.failed), (ROWS, 1));
     assert!(fake.processes.lock().unwrap().is_empty());
 }
 
@@ -167,7 +167,7 @@ fn what_is_dropped_in_time_is_not_suspected() {
     })
     .unwrap();
     assert_eq!(outcome.ending, Ending::Left);
-    assert_eq!(*left.lock().unwrap(), Some(outcome.study.done));
+    assert_eq!(*left.lock().unwrap(), Some(outcome.share.done));
     let state = snapshot(results.path()).state;
     assert!(
         state.attempts[0]

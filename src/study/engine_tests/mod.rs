@@ -208,7 +208,7 @@ fn whole_run() -> Vec<String> {
     static ROWS_OF_IT: LazyLock<Vec<String>> = LazyLock::new(|| {
         let results = tempfile::tempdir().unwrap();
         let outcome = run_with(results.path(), &Fake::default(), 1, Redo::Nothing);
-        assert_eq!((outcome.study.done, outcome.study.failed), (ROWS, 0));
+        assert_eq!((outcome.share.done, outcome.share.failed), (ROWS, 0));
         promised(&rows(results.path()))
     });
     ROWS_OF_IT.clone()

@@ -37,13 +37,13 @@ fn a_stopped_run_continues_where_it_was() {
     };
     let outcome = run_with(results.path(), &first, 2, Redo::Nothing);
     assert_eq!(outcome.ending, Ending::Stopped);
-    assert!((10..ROWS).contains(&outcome.study.done), "{outcome:?}");
+    assert!((10..ROWS).contains(&outcome.share.done), "{outcome:?}");
     let second = Fake::default();
     let end = run_with(results.path(), &second, 2, Redo::Nothing);
-    assert_eq!((end.ending, end.study.done), (Ending::Done, ROWS));
+    assert_eq!((end.ending, end.share.done), (Ending::Done, ROWS));
     assert_eq!(
         second.made.load(Ordering::SeqCst),
-        ROWS - outcome.study.done
+        ROWS - outcome.share.done
     );
     assert_eq!(promised(&rows(results.path())), expected);
     // A third run has nothing to do.
@@ -106,7 +106,7 @@ fn failures_are_rows_with_their_reason_and_can_be_redone() {
         ..Fake::default()
     };
     let outcome = run_with(results.path(), &fake, 4, Redo::Nothing);
-    assert_eq!((outcome.study.done, outcome.study.failed), (ROWS, 9));
+    assert_eq!((outcome.share.done, outcome.share.failed), (ROWS, 9));
     let rows = rows(results.path());
     let failed: Vec<&Row> = rows.iter().filter(|r| r.text("status") == FAILED).collect();
     assert_eq!(failed[0].text("phase"), "movement");
