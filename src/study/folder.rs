@@ -223,8 +223,8 @@ impl StudyFolder {
     }
 }
 
-/// How long a process waits for another one to begin or to end.
-const PATIENCE: Duration = Duration::from_secs(120);
+/// How long a process waits for others to begin or to end: a thousand may do so at once.
+const PATIENCE: Duration = Duration::from_secs(900);
 
 /// Words an input or output error.
 pub(super) fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> StudyError {

@@ -1,6 +1,5 @@
 //! May this process work on the study?
 
-use super::fingerprint::fingerprints;
 use super::folder::{StudyError, StudyFolder, io};
 use super::provenance::FORMAT;
 use super::snapshot::{provenances, select_simd};
@@ -28,26 +27,19 @@ impl Default for OpenOptions {
     }
 }
 
-/// What was found of a study that may go on.
-#[derive(Debug)]
-pub(super) struct Found {
-    pub attempts: Vec<Attempt>,
-    /// Fingerprints of the specimens' files.
-    pub specimens: BTreeMap<String, String>,
-}
-
-/// Looks whether a study may go on with this configuration, and fixes the process' level of vector
-/// instructions to that of the study. Changes no file.
+/// Looks whether a study may go on with this configuration and specimens of these fingerprints, fixes the
+/// process' level of vector instructions to that of the study, and gives the attempts so far.
+/// Changes no file.
 pub(super) fn examine(
     folder: &StudyFolder,
     config: &Config,
+    specimens: &BTreeMap<String, String>,
     options: &OpenOptions,
-) -> Result<Found, StudyError> {
+) -> Result<Vec<Attempt>, StudyError> {
     check_format(folder)?;
     let attempts = folder.store().attempts()?;
     select_simd(&attempts)?;
-    let specimens = fingerprints(&config.population)?;
-    let changes = changes(folder, config, &specimens, &provenances(&attempts))?;
+    let changes = changes(folder, config, specimens, &provenances(&attempts))?;
     let accepted = |(key, _): &(String, String)| options.accept.contains(key);
     if !changes.iter().all(accepted) {
         let (keys, differences) = changes.into_iter().unzip();
@@ -57,10 +49,7 @@ pub(super) fn examine(
             keys,
         });
     }
-    Ok(Found {
-        attempts,
-        specimens,
-    })
+    Ok(attempts)
 }
 
 /// A newer program may have laid out the folder in a way that this one would spoil.

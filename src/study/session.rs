@@ -1,5 +1,6 @@
 //! A study with its folder: opening, running, resuming.
 
+use super::fingerprint::fingerprints;
 use super::folder::{StudyError, StudyFolder, io};
 use super::isolation::{Broken, Isolation, try_suspects};
 use super::opening::{OpenOptions, check_free, examine};
@@ -86,11 +87,13 @@ impl Study {
         for path in [folder.path().to_owned(), folder.logs()] {
             std::fs::create_dir_all(&path).map_err(io("create", &path))?;
         }
+        // Before others have to wait: the files of specimens are large.
+        let specimens = fingerprints(&config.population)?;
         let lock = folder.lock()?;
         crate::fail_point!("open.locked");
-        let found = examine(&folder, &config, options)?;
+        let attempts = examine(&folder, &config, &specimens, options)?;
         let plan = Plan::of(&config);
-        check_free(&folder, &config, &plan, options.shard, &found.attempts)?;
+        check_free(&folder, &config, &plan, options.shard, &attempts)?;
         let store = folder.store();
         store.seal_dead(SEALED_AT_ONCE)?;
         store.merge()?;
@@ -100,8 +103,8 @@ impl Study {
         if std::fs::read_to_string(&file).ok().as_ref() != Some(&text) {
             folder.write(&file, &text)?;
         }
-        let next = found.attempts.last().map_or(1, |last| last.attempt + 1);
-        let provenance = Provenance::now(&config, found.specimens, threads);
+        let next = attempts.last().map_or(1, |last| last.attempt + 1);
+        let provenance = Provenance::now(&config, specimens, threads);
         let provenance = serde_json::to_value(provenance).expect("provenance is plain data");
         let journal = Writer::create(&folder.journals(), next, options.shard.parts(), provenance)?;
         crate::fail_point!("open.journal_made");
@@ -288,9 +291,10 @@ pub fn preview(
     redo: Redo,
 ) -> Result<Counts, StudyError> {
     let folder = StudyFolder::of(results, &config.study.name);
-    let found = examine(&folder, config, options)?;
+    let specimens = fingerprints(&config.population)?;
+    let attempts = examine(&folder, config, &specimens, options)?;
     let plan = Plan::of(config);
-    check_free(&folder, config, &plan, options.shard, &found.attempts)?;
+    check_free(&folder, config, &plan, options.shard, &attempts)?;
     let state = State::of(folder.store().read()?)?;
     Ok(counts_with(&plan, &state, options.shard, redo))
 }
