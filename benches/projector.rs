@@ -1,26 +1,36 @@
-//! Milliseconds a DRR, of a pelvis, a femur and a fragment by size and shape, on one thread:
-//! `cargo bench --bench projector`. Prints minima over interleaved rounds (`ROUNDS`, 9), since a
-//! shared machine only ever makes things slower.
+//! Milliseconds a DRR, of a pelvis, a femur and a fragment by size and shape, on one thread, by both
+//! projectors: `cargo bench --bench projector`. Prints minima over interleaved rounds (`ROUNDS`, 9),
+//! since a shared machine only ever makes things slower. `PITCH_PX` (1) is the pitch of `slice` and
+//! `BATCH` (8) the number of poses that are projected at once, all within 2 deg of the one named.
+//! `CHECK=1` compares each image of the pelvis with a finely stepped integral first (minutes).
 
+mod measure;
 mod synthetic;
 
-use pao_sim::xray::{Camera, PixelRect, SimdLevel};
+use measure::{setting, thread_seconds};
+use nalgebra::UnitQuaternion;
+use pao_sim::geometry::{Rigid, Vector};
+use pao_sim::xray::{BoneVolume, Camera, PixelRect, ProjectorParameters, SimdLevel, reference};
 use std::rc::Rc;
 use synthetic::{bones, pose};
 
-/// Processor time of this thread, which other processes on a shared machine add little to.
-fn processor_seconds() -> f64 {
-    let mut time = libc::timespec {
-        tv_sec: 0,
-        tv_nsec: 0,
+/// Poses about one, as in a population.
+fn about(pose: &Rigid, count: usize) -> Vec<Rigid> {
+    let turn = |n: usize| {
+        let angle = |k: usize| ((n * k) as f64).sin() * 0.02;
+        UnitQuaternion::from_scaled_axis(Vector::new(angle(1), angle(2), angle(3)))
     };
-    // SAFETY: the call writes to the structure that it is given.
-    let status = unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &mut time) };
-    assert_eq!(
-        status, 0,
-        "the system has no clock of a thread's processor time"
-    );
-    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
+    (0..count)
+        .map(|n| Rigid::from_parts(pose.translation, turn(n) * pose.rotation))
+        .collect()
+}
+
+fn image(bone: &BoneVolume, camera: &Camera, pose: &Rigid, by: &ProjectorParameters) -> Vec<f32> {
+    let mut image = vec![0.0; camera.width * camera.height];
+    let mut touched = [PixelRect::EMPTY];
+    by.projector()
+        .project_add(bone, camera, &[*pose], None, &mut image, &mut touched);
+    image
 }
 
 fn main() {
@@ -42,36 +52,71 @@ fn main() {
         ("orbit 45", pose(45.0, 3.0)),
         ("lateral", pose(90.0, 0.0)),
     ];
-    let rounds = std::env::var("ROUNDS")
-        .ok()
-        .and_then(|r| r.parse().ok())
-        .unwrap_or(9);
+    let pitch_px = std::env::var("PITCH_PX").ok().and_then(|p| p.parse().ok());
+    let projectors = [
+        ("ray_cast", ProjectorParameters::RayCast { step_mm: 1.0 }),
+        (
+            "slice",
+            ProjectorParameters::Slice {
+                pitch_px: pitch_px.unwrap_or(1.0),
+            },
+        ),
+    ];
+    if setting("CHECK", 0) == 1 {
+        println!("| pose | projector | RMS | largest (% of the image's maximum) |");
+        for (pose_name, pose) in &poses {
+            let (camera, bone) = (&cameras[0].1, &bones[0].1);
+            let exact = reference::line_integrals(bone.attenuation(), camera, pose, 0.125);
+            let largest = exact.data.iter().fold(0.0f64, |a, &b| a.max(b));
+            for (name, projector) in &projectors {
+                let image = image(bone, camera, pose, projector);
+                let differences = image.iter().zip(&exact.data);
+                let differences = differences.map(|(&a, b)| 100.0 * (f64::from(a) - b) / largest);
+                let (mut squares, mut worst) = (0.0, 0.0f64);
+                for d in differences {
+                    squares += d * d;
+                    worst = worst.max(d.abs());
+                }
+                let rms = (squares / exact.data.len() as f64).sqrt();
+                println!("| {pose_name} | {name} | {rms:.4} | {worst:.3} |");
+            }
+        }
+    }
+    let count = setting("BATCH", 8);
     let mut cases = Vec::new();
     for level in SimdLevel::available() {
         for (bone_name, bone) in &bones {
             let bone = Rc::new(bone.clone().with_simd(level));
             for (scale, camera) in &cameras {
                 for (pose_name, pose) in &poses {
-                    let name = format!("{} {scale} {bone_name} {pose_name}", level.name());
-                    cases.push((name, Rc::clone(&bone), camera, pose, f64::INFINITY));
+                    for (projector_name, parameters) in &projectors {
+                        let name = format!(
+                            "{:8} {projector_name:8} {scale} {bone_name:8} {pose_name:8}",
+                            level.name()
+                        );
+                        let poses = about(pose, count);
+                        let projector = parameters.projector();
+                        let bone = Rc::clone(&bone);
+                        cases.push((name, bone, camera, poses, projector, f64::INFINITY));
+                    }
                 }
             }
         }
     }
-    for _ in 0..rounds {
-        for (_, bone, camera, pose, best) in &mut cases {
-            let mut out = vec![0.0f32; camera.width * camera.height];
-            let rect = bone.footprint(camera, pose).unwrap_or(PixelRect::EMPTY);
+    for _ in 0..setting("ROUNDS", 9) {
+        for (_, bone, camera, poses, projector, best) in &mut cases {
+            let mut out = vec![0.0f32; poses.len() * camera.width * camera.height];
+            let mut touched = vec![PixelRect::EMPTY; poses.len()];
             // Thrice, as a registration projects one bone many times in a row.
             for _ in 0..3 {
-                let start = processor_seconds();
-                bone.project_add(camera, pose, 1.0, rect, &mut out);
-                *best = best.min((processor_seconds() - start) * 1e3);
+                let start = thread_seconds();
+                projector.project_add(bone, camera, poses, None, &mut out, &mut touched);
+                *best = best.min((thread_seconds() - start) * 1e3 / poses.len() as f64);
                 std::hint::black_box(&out);
             }
         }
     }
     for (name, .., best) in &cases {
-        println!("{name:35} {best:8.3} ms");
+        println!("{name} {best:8.3} ms");
     }
 }

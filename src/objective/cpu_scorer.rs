@@ -6,7 +6,7 @@ use super::view_cost::ViewCost;
 use crate::geometry::Rigid;
 use crate::image::Image;
 use crate::simd::SimdLevel;
-use crate::xray::BoneVolume;
+use crate::xray::{BoneVolume, Projector, ProjectorParameters};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -24,8 +24,8 @@ pub enum Views {
 /// How candidates are projected and their views combined.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScorerParameters {
-    /// Distance of the samples along a ray in mm, above 0. Default 1.
-    pub step_mm: f64,
+    /// What makes DRRs. Default: the ray caster with a step of 1 mm.
+    pub projector: ProjectorParameters,
     /// Default: the mean.
     pub views: Views,
     /// Vector instructions of the similarity, which gives the same bits at every level. Default:
@@ -36,7 +36,7 @@ pub struct ScorerParameters {
 impl Default for ScorerParameters {
     fn default() -> Self {
         Self {
-            step_mm: 1.0,
+            projector: ProjectorParameters::RayCast { step_mm: 1.0 },
             views: Views::Mean,
             simd: SimdLevel::current(),
         }
@@ -52,12 +52,14 @@ pub struct ScorerView {
     pub camera_from_world: Rigid,
 }
 
-/// Scores candidates one after another on the calling thread; allocates nothing once it is made.
-/// A candidate's cost depends on that candidate alone, bit for bit.
-#[derive(Clone, Debug)]
+/// Scores candidates one after another on the calling thread; allocates nothing once it is made and
+/// its projector has seen the largest image. A candidate's cost depends on that candidate alone, bit
+/// for bit.
+#[derive(Debug)]
 pub struct CpuScorer {
     views: Vec<ViewCost>,
     moving: Vec<Arc<BoneVolume>>,
+    projector: Box<dyn Projector>,
     parameters: ScorerParameters,
 }
 
@@ -76,14 +78,16 @@ impl CpuScorer {
     ) -> Self {
         assert!(!views.is_empty(), "a scorer needs a view");
         assert!(!moving.is_empty(), "a scorer needs an object that moves");
+        let mut projector = parameters.projector.projector();
         let views = views
             .into_iter()
             .map(|view| {
                 ViewCost::new(
                     view.fixed,
                     view.camera_from_world,
+                    moving.len(),
                     &statics,
-                    parameters.step_mm,
+                    projector.as_mut(),
                     parameters.simd,
                 )
             })
@@ -91,8 +95,27 @@ impl CpuScorer {
         Self {
             views,
             moving,
+            projector,
             parameters,
         }
+    }
+
+    /// The same scorer for candidates about these poses, one for each moving object: a projector
+    /// that distinguishes axes keeps to those that suit these poses, so that the cost has no jumps.
+    /// Without this each candidate has its own axes.
+    ///
+    /// # Panics
+    /// When there is not one pose for each moving object.
+    pub fn about(mut self, world_from_volume: &[Rigid]) -> Self {
+        assert_eq!(
+            world_from_volume.len(),
+            self.moving.len(),
+            "one pose for each moving object"
+        );
+        for view in &mut self.views {
+            view.fix_axes(&self.moving, world_from_volume, self.projector.as_ref());
+        }
+        self
     }
 
     /// For one view whose camera is the world: a candidate's poses are `camera_from_volume`.
@@ -137,7 +160,15 @@ impl CpuScorer {
             self.moving.len(),
             "one pose for each moving object"
         );
-        self.views[view].similarity(&self.moving, world_from_volume, self.parameters.step_mm)
+        let mut similarity = [0.0];
+        let projector = self.projector.as_mut();
+        self.views[view].add_similarities(
+            &self.moving,
+            world_from_volume,
+            projector,
+            &mut similarity,
+        );
+        similarity[0]
     }
 }
 
@@ -155,13 +186,9 @@ impl Scorer for CpuScorer {
         );
         costs.fill(0.0);
         // View after view, so that a view's images stay in the cache for the whole batch.
-        for view in 0..self.views.len() {
-            for (cost, poses) in costs
-                .iter_mut()
-                .zip(world_from_volume.chunks_exact(objects))
-            {
-                *cost += self.view_similarity(view, poses);
-            }
+        for view in &mut self.views {
+            let projector = self.projector.as_mut();
+            view.add_similarities(&self.moving, world_from_volume, projector, costs);
         }
         if self.parameters.views == Views::Mean {
             for cost in costs {

@@ -1,27 +1,32 @@
 //! The similarity of one view, recomputed only where moving objects can change it.
 
 use super::comparison::Comparison;
-use super::drr::add_line_integrals;
 use super::similarity::FixedView;
 use crate::geometry::Rigid;
 use crate::image::{Image, PixelRect};
 use crate::simd::SimdLevel;
-use crate::xray::BoneVolume;
+use crate::xray::{BoneVolume, Projector};
 use std::sync::Arc;
 
 /// One view of a scorer: what the static objects give is computed once, and every candidate
-/// changes and restores only the pixels near its moving objects.
+/// changes and restores only the pixels near its moving objects. Candidates are projected as many at
+/// a time as the projector likes.
 #[derive(Clone, Debug)]
 pub(super) struct ViewCost {
     fixed: Arc<FixedView>,
     camera_from_world: Rigid,
     background: Background,
-    /// The current projection; the background's outside `drawn`.
-    projection: Vec<f32>,
-    drawn: PixelRect,
+    /// For each moving object the axis that it is projected along, if it is fixed.
+    axes: Vec<Option<usize>>,
+    /// The current projections, one after the other; the background's outside `drawn` of each.
+    projections: Vec<f32>,
+    drawn: Vec<PixelRect>,
     /// Its gradients are the background's outside `derived`.
     comparison: Comparison,
     derived: PixelRect,
+    /// Scratch: one object's poses in this camera, and the pixels that they touch.
+    poses: Vec<Rigid>,
+    touched: Vec<PixelRect>,
 }
 
 /// The static objects' projection and all that follows from it.
@@ -37,21 +42,25 @@ struct Background {
 }
 
 impl ViewCost {
-    /// Projects the static objects (with `world_from_volume` each) and compares them.
+    /// Projects the static objects (with `world_from_volume` each) and compares them. The number of
+    /// objects that will move is `moving`.
     pub fn new(
         fixed: Arc<FixedView>,
         camera_from_world: Rigid,
+        moving: usize,
         statics: &[(Arc<BoneVolume>, Rigid)],
-        step_mm: f64,
+        projector: &mut dyn Projector,
         level: SimdLevel,
     ) -> Self {
         let camera = *fixed.camera();
         let whole = PixelRect::of_image(camera.width, camera.height);
         let mut projection = vec![0.0; camera.width * camera.height];
         for (bone, world_from_volume) in statics {
-            let camera_from_volume = camera_from_world * world_from_volume;
-            add_line_integrals(bone, &camera, &camera_from_volume, step_mm, &mut projection);
+            let pose = [camera_from_world * world_from_volume];
+            let mut touched = [PixelRect::EMPTY];
+            projector.project_add(bone, &camera, &pose, None, &mut projection, &mut touched);
         }
+        let batch = projector.batch();
         let mut comparison = Comparison::new(&fixed, level);
         comparison.derive(&projection, whole);
         let centers = comparison.all_centers();
@@ -59,43 +68,97 @@ impl ViewCost {
         let total = comparison.sum_of_costs(&fixed, centers, Some(&mut costs));
         Self {
             camera_from_world,
+            axes: vec![None; moving],
+            projections: projection.repeat(batch),
             background: Background {
-                projection: projection.clone(),
+                projection,
                 gradients: comparison.gradients.clone(),
                 total,
                 cost_area: area_sums(&costs, centers.width()),
             },
-            projection,
-            drawn: PixelRect::EMPTY,
+            drawn: vec![PixelRect::EMPTY; batch],
             comparison,
             derived: PixelRect::EMPTY,
+            poses: Vec::with_capacity(batch),
+            touched: vec![PixelRect::EMPTY; batch],
             fixed,
         }
     }
 
-    /// The similarity with the moving objects at the given poses, lower is better.
-    pub fn similarity(
+    /// Fixes the axes that moving objects are projected along at what suits these poses.
+    pub fn fix_axes(
         &mut self,
         moving: &[Arc<BoneVolume>],
         world_from_volume: &[Rigid],
-        step_mm: f64,
-    ) -> f64 {
-        self.restore_background();
+        projector: &dyn Projector,
+    ) {
         let camera = self.fixed.camera();
-        for (bone, world_from_volume) in moving.iter().zip(world_from_volume) {
-            let camera_from_volume = self.camera_from_world * world_from_volume;
-            let touched = add_line_integrals(
-                bone,
-                camera,
-                &camera_from_volume,
-                step_mm,
-                &mut self.projection,
-            );
-            self.drawn = self.drawn.union(&touched);
+        for ((axis, bone), pose) in self.axes.iter_mut().zip(moving).zip(world_from_volume) {
+            *axis = projector.axis(bone, camera, &(self.camera_from_world * pose));
         }
+    }
+
+    /// Adds to each cost the similarity of a candidate, which has one pose for each moving object;
+    /// lower is better.
+    pub fn add_similarities(
+        &mut self,
+        moving: &[Arc<BoneVolume>],
+        world_from_volume: &[Rigid],
+        projector: &mut dyn Projector,
+        costs: &mut [f64],
+    ) {
+        let batch = self.drawn.len();
+        let poses = world_from_volume.chunks(batch * moving.len());
+        for (costs, poses) in costs.chunks_mut(batch).zip(poses) {
+            self.project(moving, poses, projector);
+            for (number, cost) in costs.iter_mut().enumerate() {
+                *cost += self.similarity(number);
+            }
+        }
+    }
+
+    /// Projects as many candidates as there is room for.
+    fn project(
+        &mut self,
+        moving: &[Arc<BoneVolume>],
+        world_from_volume: &[Rigid],
+        projector: &mut dyn Projector,
+    ) {
+        let camera = self.fixed.camera();
+        let pixels = camera.width * camera.height;
+        let candidates = world_from_volume.len() / moving.len();
+        let images = &mut self.projections[..candidates * pixels];
+        for (image, drawn) in images.chunks_exact_mut(pixels).zip(&mut self.drawn) {
+            copy_part(&self.background.projection, image, camera.width, *drawn);
+            *drawn = PixelRect::EMPTY;
+        }
+        for (object, bone) in moving.iter().enumerate() {
+            let poses = world_from_volume[object..].iter().step_by(moving.len());
+            self.poses.clear();
+            self.poses
+                .extend(poses.map(|pose| self.camera_from_world * pose));
+            let touched = &mut self.touched[..candidates];
+            let axis = self.axes[object];
+            projector.project_add(bone, camera, &self.poses, axis, images, touched);
+            for (drawn, touched) in self.drawn.iter_mut().zip(touched) {
+                *drawn = drawn.union(touched);
+            }
+        }
+    }
+
+    /// The similarity of one of the current projections.
+    fn similarity(&mut self, number: usize) -> f64 {
+        let camera = self.fixed.camera();
         let whole = PixelRect::of_image(camera.width, camera.height);
-        self.derived = self.drawn.grown(self.comparison.gradient_reach(), &whole);
-        self.comparison.derive(&self.projection, self.derived);
+        let gradients = self.background.gradients.iter();
+        for (from, to) in gradients.zip(&mut self.comparison.gradients) {
+            copy_part(from, to, camera.width, self.derived);
+        }
+        let reach = self.comparison.gradient_reach();
+        self.derived = self.drawn[number].grown(reach, &whole);
+        let pixels = camera.width * camera.height;
+        let projection = &self.projections[number * pixels..][..pixels];
+        self.comparison.derive(projection, self.derived);
 
         let all = self.comparison.all_centers();
         let centers = self
@@ -109,30 +172,15 @@ impl ViewCost {
         (untouched + touched) / self.fixed.costs()
     }
 
-    /// The current projection: that of the candidate compared last.
+    /// The projection of the first of the candidates compared last.
     pub fn projection(&self) -> Image<f32> {
         let camera = self.fixed.camera();
-        Image::new(camera.width, camera.height, self.projection.clone())
-    }
-
-    fn restore_background(&mut self) {
-        let width = self.fixed.camera().width;
-        copy_part(
-            &self.background.projection,
-            &mut self.projection,
-            width,
-            self.drawn,
-        );
-        for (from, to) in self
-            .background
-            .gradients
-            .iter()
-            .zip(&mut self.comparison.gradients)
-        {
-            copy_part(from, to, width, self.derived);
-        }
-        self.drawn = PixelRect::EMPTY;
-        self.derived = PixelRect::EMPTY;
+        let pixels = camera.width * camera.height;
+        Image::new(
+            camera.width,
+            camera.height,
+            self.projections[..pixels].to_vec(),
+        )
     }
 }
 

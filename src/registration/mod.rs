@@ -13,5 +13,5 @@ pub use models::ModelRecipe;
 pub use observation::{BoneModels, Observation, ObservedView, Shape};
 pub use outcome::{Outcome, ShapeOutcome, StageRecord};
 
-pub use paper::{Paper, PaperParameters};
+pub use paper::{Paper, PaperParameters, PaperSlice, PaperSliceParameters};
 pub use strategy::{RegistrationError, Strategy};

@@ -4,7 +4,7 @@ use super::preparation::{Preparation, PreparedFragment};
 use super::record;
 use super::{CaseKey, Config, Failure, RegistrationKey, Scenario, StrategyParameters, Worker};
 use crate::random::{Purpose, stream};
-use crate::registration::paper::Paper;
+use crate::registration::paper::{Paper, PaperSlice};
 use crate::registration::{Outcome, Shape, Strategy};
 use crate::simulation::case::{Case, CaseParameters};
 use crate::simulation::{Pick, sample_movement};
@@ -104,6 +104,9 @@ impl CaseWorker {
 fn strategy(parameters: &StrategyParameters) -> Box<dyn Strategy + Send> {
     match parameters {
         StrategyParameters::Paper(parameters) => Box::new(Paper {
+            parameters: parameters.clone(),
+        }),
+        StrategyParameters::PaperSlice(parameters) => Box::new(PaperSlice {
             parameters: parameters.clone(),
         }),
     }

@@ -169,6 +169,10 @@ impl Source<'_> {
                 let parameters = self.section(table, &format!("registration.{name}."));
                 Some(StrategyParameters::Paper(parameters))
             }
+            "paper_slice" => {
+                let parameters = self.section(table, &format!("registration.{name}."));
+                Some(StrategyParameters::PaperSlice(parameters))
+            }
             _ => {
                 let methods = StrategyParameters::METHODS;
                 let hint = suggestion(&method, methods);
@@ -319,7 +323,9 @@ photons = 3
     #[test]
     fn a_part_of_a_nested_table_keeps_the_rest() {
         let config = parse("[registration.paper.pelvis]\npopulation = 40\n").unwrap();
-        let StrategyParameters::Paper(paper) = &config.registration["paper"];
+        let StrategyParameters::Paper(paper) = &config.registration["paper"] else {
+            panic!("{:?}", config.registration);
+        };
         let defaults = PaperParameters::default();
         assert_eq!(paper.pelvis.population, 40);
         assert_eq!(
@@ -327,6 +333,20 @@ photons = 3
             defaults.pelvis.sd_rotation_deg
         );
         assert_eq!(paper.femur, defaults.femur);
+    }
+
+    #[test]
+    fn the_papers_search_has_a_variant_with_slices() {
+        let text = "[registration.paper]\n[registration.paper_slice]\npitch_px = 0.75\n\
+                    paper.pelvis.population = 40\n";
+        let config = parse(text).unwrap();
+        assert_eq!(config.registration.len(), 2);
+        let StrategyParameters::PaperSlice(slice) = &config.registration["paper_slice"] else {
+            panic!("{:?}", config.registration);
+        };
+        assert_eq!((slice.pitch_px, slice.paper.pelvis.population), (0.75, 40));
+        let message = parse("[registration.paper_slice]\npitch_px = 9\n").unwrap_err();
+        assert!(message.contains("pitch_px 9 lies outside"), "{message}");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The methods that `[registration.NAME]` sections configure.
 
-use crate::registration::paper::PaperParameters;
+use crate::registration::paper::{PaperParameters, PaperSliceParameters};
 use serde::Serialize;
 
 /// Parameters of one strategy. Its section may name the `method`; without it the section's name is
@@ -11,16 +11,19 @@ use serde::Serialize;
 pub enum StrategyParameters {
     /// The paper's method.
     Paper(PaperParameters),
+    /// The paper's search with DRRs by slice resampling.
+    PaperSlice(PaperSliceParameters),
 }
 
 impl StrategyParameters {
     /// Names of all methods.
-    pub const METHODS: [&'static str; 1] = ["paper"];
+    pub const METHODS: [&'static str; 2] = ["paper", "paper_slice"];
 
     /// Values out of range, as (field, what is wrong and what is expected).
     pub fn problems(&self) -> Vec<(String, String)> {
         match self {
             Self::Paper(parameters) => parameters.problems(),
+            Self::PaperSlice(parameters) => parameters.problems(),
         }
     }
 }

@@ -3,9 +3,11 @@
 use super::footprint::{Hull, PixelRect};
 use super::kernel::{KernelVolume, Projection};
 use super::rays::IndexRays;
+use super::slice::{Lattice, SliceStack};
 use super::{AttenuationParameters, Camera, SimdLevel};
 use crate::geometry::Rigid;
 use crate::volume::{Grid, Volume};
+use std::sync::OnceLock;
 
 /// One object of a registration: linear attenuation per mm, zero outside the bone, with a border
 /// of one zero voxel all round, in the world of the specimen's CT. Built once, then only read:
@@ -14,7 +16,10 @@ use crate::volume::{Grid, Volume};
 pub struct BoneVolume {
     attenuation: Volume<f32>,
     hull: Hull,
-    kernel: KernelVolume,
+    /// Voxels as the ray caster reads them, made when it first does.
+    kernel: OnceLock<KernelVolume>,
+    /// Voxels as slices across each axis, made when they are first resampled.
+    stacks: [OnceLock<SliceStack>; 3],
     simd: SimdLevel,
 }
 
@@ -76,7 +81,8 @@ impl BoneVolume {
     fn prepare(attenuation: Volume<f32>) -> Self {
         Self {
             hull: Hull::of(&attenuation),
-            kernel: KernelVolume::new(&attenuation),
+            kernel: OnceLock::new(),
+            stacks: Default::default(),
             attenuation,
             simd: SimdLevel::current(),
         }
@@ -100,6 +106,27 @@ impl BoneVolume {
     /// larger than the shadow.
     pub fn footprint(&self, camera: &Camera, camera_from_volume: &Rigid) -> Option<PixelRect> {
         self.hull.footprint(camera, camera_from_volume)
+    }
+
+    /// The level of vector instructions that the bone is projected with.
+    pub fn simd(&self) -> SimdLevel {
+        self.simd
+    }
+
+    pub(super) fn hull(&self) -> &Hull {
+        &self.hull
+    }
+
+    /// The bone as slices across an axis of its volume.
+    pub(super) fn stack(&self, axis: usize) -> &SliceStack {
+        self.stacks[axis].get_or_init(|| SliceStack::new(&self.attenuation, axis))
+    }
+
+    /// The axis of the bone's volume that the principal ray follows most.
+    pub(super) fn dominant_axis(&self, camera: &Camera, camera_from_volume: &Rigid) -> usize {
+        let grid = &self.attenuation.grid;
+        let rays = IndexRays::new(camera, camera_from_volume, grid);
+        Lattice::dominant_axis(&rays, &grid.spacing)
     }
 
     /// Adds the bone's line integrals (of attenuation over mm, so without unit) to the pixels
@@ -128,7 +155,10 @@ impl BoneVolume {
         );
         assert!(step_mm > 0.0, "step is {step_mm} mm; expected above 0");
         let rays = IndexRays::new(camera, camera_from_volume, &self.attenuation.grid);
-        Projection::new(&self.kernel, rays, step_mm, rect, camera.width).add(self.simd, out);
+        let kernel = self
+            .kernel
+            .get_or_init(|| KernelVolume::new(&self.attenuation));
+        Projection::new(kernel, rays, step_mm, rect, camera.width).add(self.simd, out);
     }
 }
 

@@ -1,7 +1,7 @@
 //! Where on the detector an object can be seen.
 
 use super::Camera;
-use crate::geometry::{Point, Rigid};
+use crate::geometry::{Point, Rigid, Vector};
 pub use crate::image::PixelRect;
 use crate::volume::Volume;
 
@@ -16,6 +16,8 @@ impl PixelRect {
 #[derive(Clone, Debug)]
 pub(crate) struct Hull {
     points: Vec<Point>,
+    /// The same as indices of the volume.
+    indices: Vec<Vector>,
 }
 
 /// Slices of the volume that share one box of the hull. Thin enough that the boxes follow the
@@ -28,7 +30,7 @@ impl Hull {
     pub fn of(volume: &Volume<f32>) -> Self {
         let grid = &volume.grid;
         let [nx, ny, nz] = grid.dims;
-        let mut points = Vec::new();
+        let mut indices = Vec::new();
         for first in (0..nz).step_by(SLAB) {
             let last = (first + SLAB).min(nz);
             let (mut min, mut max) = ([usize::MAX; 3], [0; 3]);
@@ -47,17 +49,33 @@ impl Hull {
                 continue;
             }
             for corner in 0..8 {
-                let index: [f64; 3] = std::array::from_fn(|axis| {
+                indices.push(Vector::from_fn(|axis, _| {
                     if corner >> axis & 1 == 0 {
                         min[axis] as f64 - 1.0
                     } else {
                         max[axis] as f64 + 1.0
                     }
-                });
-                points.push(grid.point(index[0], index[1], index[2]));
+                }));
             }
         }
-        Self { points }
+        Self {
+            points: indices.iter().map(|i| grid.point(i.x, i.y, i.z)).collect(),
+            indices,
+        }
+    }
+
+    /// The points as continuous indices of the volume.
+    pub fn indices(&self) -> impl Iterator<Item = Vector> + '_ {
+        self.indices.iter().copied()
+    }
+
+    /// The least and the greatest distance in mm of a point from the source, perpendicular to the
+    /// detector.
+    pub fn depths(&self, camera_from_volume: &Rigid) -> (f64, f64) {
+        let depths = self.points.iter().map(|p| -(camera_from_volume * p).z);
+        depths.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), d| {
+            (least.min(d), most.max(d))
+        })
     }
 
     /// The pixels whose rays can meet the hull between source and detector, or `None` if there are

@@ -6,9 +6,11 @@ pub mod bone;
 pub mod camera;
 pub mod footprint;
 mod kernel;
+pub mod projector;
 pub mod pyramid;
 mod rays;
 pub mod reference;
+mod slice;
 
 pub use crate::simd::SimdLevel;
 pub use attenuation::AttenuationParameters;
@@ -16,8 +18,11 @@ pub use body::BodyVolume;
 pub use bone::BoneVolume;
 pub use camera::{Camera, Orbit};
 pub use footprint::PixelRect;
+pub use projector::{Projector, ProjectorParameters, RayCast, SliceResampling};
 
 #[cfg(test)]
 mod closed_form_tests;
 #[cfg(test)]
 mod projection_tests;
+#[cfg(test)]
+mod slice_tests;

@@ -9,7 +9,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// A small detector with the CIOS Fusion's field of view, its principal point off the centre.
-fn small_camera() -> Camera {
+pub(super) fn small_camera() -> Camera {
     let mut camera = Camera::centered(47, 6.2, 1020.0);
     camera.height = 39;
     camera.principal = Pixel::new(21.7, 20.2);
@@ -17,7 +17,7 @@ fn small_camera() -> Camera {
 }
 
 /// An oblique grid with three different spacings.
-fn oblique_grid(dims: [usize; 3]) -> Grid {
+pub(super) fn oblique_grid(dims: [usize; 3]) -> Grid {
     Grid {
         dims,
         spacing: [0.9, 1.3, 2.1],
@@ -27,7 +27,7 @@ fn oblique_grid(dims: [usize; 3]) -> Grid {
 }
 
 /// Blobs of noise in a void: 10 to 20 % of the voxels, as in a pelvis.
-fn blobs(grid: Grid, seed: u64) -> Volume<f32> {
+pub(super) fn blobs(grid: Grid, seed: u64) -> Volume<f32> {
     let mut draw = ChaCha8Rng::seed_from_u64(seed);
     let balls: Vec<(Vector, f64)> = (0..4)
         .map(|_| {
@@ -46,7 +46,7 @@ fn blobs(grid: Grid, seed: u64) -> Volume<f32> {
 }
 
 /// The pose that shows a grid's centre `depth` mm from the source, turned by Euler angles.
-fn pose(grid: &Grid, depth: f64, angles: [f64; 3]) -> Rigid {
+pub(super) fn pose(grid: &Grid, depth: f64, angles: [f64; 3]) -> Rigid {
     let center = grid.point(
         (grid.dims[0] as f64 - 1.0) / 2.0,
         (grid.dims[1] as f64 - 1.0) / 2.0,

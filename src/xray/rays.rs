@@ -59,6 +59,33 @@ impl IndexRays {
         self.axis + self.column * u as f64 + self.row * v as f64
     }
 
+    /// Index per mm of depth along the ray of any point of the image, in pixels.
+    pub fn slope_at(&self, u: f64, v: f64) -> Vector {
+        self.axis + self.column * u + self.row * v
+    }
+
+    /// The pixel, whether in the image or not, whose centre is nearest to the principal point.
+    pub fn principal_pixel(&self) -> [f64; 2] {
+        [
+            self.camera.principal.x.round(),
+            self.camera.principal.y.round(),
+        ]
+    }
+
+    /// Index per mm of depth along the principal ray.
+    pub fn principal_slope(&self) -> Vector {
+        self.slope_at(self.camera.principal.x, self.camera.principal.y)
+    }
+
+    /// Tangent per pixel of the angle to the principal ray, and the principal point.
+    pub fn perspective(&self) -> (f64, [f64; 2]) {
+        let camera = &self.camera;
+        (
+            camera.pixel_mm / camera.source_detector_mm,
+            [camera.principal.x, camera.principal.y],
+        )
+    }
+
     /// Length in mm of the ray of a pixel per mm of depth: 1 on the principal ray, 1.02 in the
     /// corners of the CIOS Fusion's image.
     #[inline]

@@ -75,7 +75,13 @@ pub fn register(
             parameters: cmaes_parameters(paper, p.population),
         }
         .run(
-            &mut views.coarse_scorer(camera_from_world, &[bones[object]], statics, paper),
+            &mut views.coarse_scorer(
+                camera_from_world,
+                &[bones[object]],
+                &[start],
+                statics,
+                paper,
+            ),
             stream(COARSE[object]),
         )
         .map_err(failed(COARSE[object]))?;
@@ -99,7 +105,13 @@ pub fn register(
             spaces: &[space(poses[object])],
             search: search(twist(p.box_rotation_deg, p.box_translation_mm).to_vec()),
         }
-        .run(&mut views.fine_scorer(camera_from_world, &[bones[object]], statics, paper))
+        .run(&mut views.fine_scorer(
+            camera_from_world,
+            &[bones[object]],
+            &[poses[object]],
+            statics,
+            paper,
+        ))
         .map_err(failed(FINE[object]))?;
         poses[object] = result.poses[0];
         records.push(result.record);
@@ -114,7 +126,7 @@ pub fn register(
         spaces: &poses.map(space),
         search: search(half_widths),
     }
-    .run(&mut views.fine_scorer(camera_from_world, &bones, Vec::new(), paper))
+    .run(&mut views.fine_scorer(camera_from_world, &bones, &poses, Vec::new(), paper))
     .map_err(failed(JOINT))?;
     records.push(result.record);
     Ok([

@@ -12,6 +12,7 @@ use crate::registration::outcome::{Outcome, ShapeOutcome, StageRecord};
 use crate::registration::strategy::{RegistrationCause, RegistrationError, Strategy};
 use crate::shape_estimation::{RegisteredView, ShapeInput, estimate_cuts};
 use crate::surgery::CutPlanes;
+use crate::xray::ProjectorParameters;
 use std::time::Instant;
 
 /// The paper's registration: single-landmark initialization, three single-view pelvis
@@ -57,13 +58,26 @@ impl Strategy for Paper {
     }
 
     fn register(&self, observation: &Observation) -> Result<Outcome, RegistrationError> {
+        let step_mm = self.parameters.step_mm;
+        self.register_by(ProjectorParameters::RayCast { step_mm }, observation)
+    }
+}
+
+impl Paper {
+    /// Registers with DRRs of the given projector.
+    pub(super) fn register_by(
+        &self,
+        projector: ProjectorParameters,
+        observation: &Observation,
+    ) -> Result<Outcome, RegistrationError> {
         let paper = &self.parameters;
         let optimizer = |stage: &str| -> Stream {
             let key = format!("{}/{stage}", observation.stream_key);
             stream(observation.seed, Purpose::Optimizer, &key)
         };
         let mut stages = Vec::new();
-        let views = PreparedViews::new(&observation.views, paper).map_err(failed("preparation"))?;
+        let views = PreparedViews::new(&observation.views, paper, projector)
+            .map_err(failed("preparation"))?;
         let initial = from_single_landmark(
             &observation.hip,
             &observation.views[0].camera,
@@ -104,9 +118,7 @@ impl Strategy for Paper {
             stages,
         })
     }
-}
 
-impl Paper {
     /// `camera_from_pelvis` of the three views, and the orbital angles of the second and third.
     fn register_single_views(
         &self,

@@ -52,7 +52,10 @@ pub fn register_view(
         similarity_weight: paper.similarity_weight,
         parameters: cmaes_parameters(paper, own.population),
     }
-    .run(&mut views.coarse_view_scorer(index, pelvis, paper), stream)
+    .run(
+        &mut views.coarse_view_scorer(index, pelvis, Some(&start), paper),
+        stream,
+    )
     .map_err(failed(stages.cmaes))?;
     records.push(coarse.record);
 
@@ -66,7 +69,7 @@ pub fn register_view(
             max_evaluations: paper.bobyqa_max_evaluations,
         },
     }
-    .run(&mut views.fine_view_scorer(index, pelvis, paper))
+    .run(&mut views.fine_view_scorer(index, pelvis, &coarse.poses[0], paper))
     .map_err(failed(stages.bobyqa))?;
     records.push(fine.record);
     Ok(fine.poses[0])
@@ -92,7 +95,7 @@ pub fn search_orbit(
         .collect();
     let mut costs = vec![0.0; poses.len()];
     views
-        .coarse_view_scorer(index, pelvis, paper)
+        .coarse_view_scorer(index, pelvis, None, paper)
         .similarities(&poses, &mut costs);
     let best = (0..costs.len())
         .filter(|&i| costs[i].is_finite())

@@ -19,6 +19,16 @@ pub(crate) struct KernelVolume {
     pub occupancy: Occupancy,
 }
 
+/// Who prepares a volume.
+#[derive(Clone, Copy)]
+enum Work {
+    /// The calling thread. A volume that is made when it is first needed must not wait for a pool of
+    /// threads of which one may be waiting for the same volume.
+    OneThread,
+    /// The pool's threads.
+    AllThreads,
+}
+
 /// The largest voxel: all that a signed 16-bit number holds.
 const FULL_SCALE: f32 = 32767.0;
 
@@ -34,7 +44,7 @@ impl KernelVolume {
         let dims = volume.grid.dims;
         let largest = volume.data.iter().fold(0.0f32, |a, &b| a.max(b));
         let row = |j, k| &volume.data[volume.grid.offset(0, j, k)..][..dims[0]];
-        Self::of_rows(dims, row, |value| value, largest)
+        Self::of_rows(dims, row, |value| value, largest, Work::OneThread)
     }
 
     /// Prepares `part` of the values of the voxels `block` of a volume, none above `largest`, with a
@@ -63,7 +73,7 @@ impl KernelVolume {
             let (j, k) = (along_j.start + j - 1, along_k.start + k - 1);
             &volume.data[volume.grid.offset(along_i.start, j, k)..][..along_i.len()]
         };
-        let kernel = Self::of_rows(grid.dims, row, part, largest);
+        let kernel = Self::of_rows(grid.dims, row, part, largest, Work::AllThreads);
         (grid, kernel)
     }
 
@@ -73,6 +83,7 @@ impl KernelVolume {
         row: impl Fn(usize, usize) -> &'a [f32] + Sync,
         part: impl Fn(f32) -> f32 + Sync,
         largest: f32,
+        work: Work,
     ) -> Self {
         assert!(
             dims.iter().all(|&n| n <= Self::LARGEST),
@@ -83,23 +94,26 @@ impl KernelVolume {
         let [nx, ny, nz] = dims;
         let per_unit = FULL_SCALE / largest;
         let mut pairs = vec![[0i16; 2]; nx * ny * (nz + 1) + 2];
-        pairs
-            .par_chunks_exact_mut(nx * ny)
-            .take(nz)
-            .enumerate()
-            .for_each(|(k, slice)| {
-                for j in 0..ny {
-                    let values = row(j, k);
-                    let at = j * nx + (nx - values.len()) / 2;
-                    for (i, &value) in values.iter().enumerate() {
-                        let value = (part(value) * per_unit).round() as i16;
-                        slice[at + i][0] = value;
-                        if j > 0 {
-                            slice[at + i - nx][1] = value;
-                        }
+        let fill = |k: usize, slice: &mut [[i16; 2]]| {
+            for j in 0..ny {
+                let values = row(j, k);
+                let at = j * nx + (nx - values.len()) / 2;
+                for (i, &value) in values.iter().enumerate() {
+                    let value = (part(value) * per_unit).round() as i16;
+                    slice[at + i][0] = value;
+                    if j > 0 {
+                        slice[at + i - nx][1] = value;
                     }
                 }
-            });
+            }
+        };
+        let slices = pairs[..nx * ny * nz].chunks_exact_mut(nx * ny);
+        match work {
+            Work::OneThread => slices.enumerate().for_each(|(k, slice)| fill(k, slice)),
+            Work::AllThreads => (slices.collect::<Vec<_>>().into_par_iter())
+                .enumerate()
+                .for_each(|(k, slice)| fill(k, slice)),
+        }
         Self {
             occupancy: Occupancy::new(dims, &pairs),
             dims,
