@@ -2,7 +2,7 @@
 //! projectors: `cargo bench --bench projector`. Prints minima over interleaved rounds (`ROUNDS`, 9),
 //! since a shared machine only ever makes things slower. `PITCH_PX` (1) is the pitch of `slice` and
 //! `BATCH` (8) the number of poses that are projected at once, all within 2 deg of the one named.
-//! `CHECK=1` compares each image of the pelvis with a finely stepped integral first (minutes).
+//! `ONLY="avx512   slice"` leaves out all cases without these words. `CHECK=1` compares each image of the pelvis with a finely stepped integral first (minutes).
 
 mod measure;
 mod synthetic;
@@ -83,6 +83,7 @@ fn main() {
         }
     }
     let count = setting("BATCH", 8);
+    let only = std::env::var("ONLY").ok();
     let mut cases = Vec::new();
     for level in SimdLevel::available() {
         for (bone_name, bone) in &bones {
@@ -94,6 +95,9 @@ fn main() {
                             "{:8} {projector_name:8} {scale} {bone_name:8} {pose_name:8}",
                             level.name()
                         );
+                        if !only.as_deref().is_none_or(|only| name.contains(only)) {
+                            continue;
+                        }
                         let poses = about(pose, count);
                         let projector = parameters.projector();
                         let bone = Rc::clone(&bone);
