@@ -355,6 +355,33 @@ mod tests {
     }
 
     #[test]
+    fn slices_cost_a_candidate_what_rays_do_and_in_any_batch_the_same() {
+        let scene = Scene::new();
+        // More than a batch, most of them about one pose and some partly beside the image.
+        let candidates: Vec<Rigid> = (0..25)
+            .map(|n| pose(5.0 * f64::from(n), -8.0, f64::from(n), 0.02 * f64::from(n)))
+            .collect();
+        let mut by_rays = vec![0.0; candidates.len()];
+        scene
+            .scorer(ScorerParameters::default())
+            .similarities(&candidates, &mut by_rays);
+        let parameters = ScorerParameters {
+            projector: ProjectorParameters::Slice { pitch_px: 1.0 },
+            ..ScorerParameters::default()
+        };
+        let mut scorer = scene.scorer(parameters).about(&candidates[..1]);
+        let mut by_slices = vec![0.0; candidates.len()];
+        scorer.similarities(&candidates, &mut by_slices);
+        for (n, candidate) in candidates.iter().enumerate().rev() {
+            let mut alone = [0.0];
+            scorer.similarities(&[*candidate], &mut alone);
+            assert_eq!(alone[0], by_slices[n], "candidate {n}");
+            let difference = (by_slices[n] - by_rays[n]).abs();
+            assert!(difference < 5e-3, "candidate {n}: {difference}");
+        }
+    }
+
+    #[test]
     fn every_level_gives_the_same_bits_and_the_sum_is_the_mean_times_views() {
         let scene = Scene::new();
         let candidates = candidates();

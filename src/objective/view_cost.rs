@@ -24,7 +24,7 @@ pub(super) struct ViewCost {
     /// Its gradients are the background's outside `derived`.
     comparison: Comparison,
     derived: PixelRect,
-    /// Scratch: one object's poses in this camera, and the pixels that they touch.
+    /// Memory to work in: one object's poses in this camera, and the pixels that they touch.
     poses: Vec<Rigid>,
     touched: Vec<PixelRect>,
 }
@@ -60,7 +60,6 @@ impl ViewCost {
             let mut touched = [PixelRect::EMPTY];
             projector.project_add(bone, &camera, &pose, None, &mut projection, &mut touched);
         }
-        let batch = projector.batch();
         let mut comparison = Comparison::new(&fixed, level);
         comparison.derive(&projection, whole);
         let centers = comparison.all_centers();
@@ -69,18 +68,18 @@ impl ViewCost {
         Self {
             camera_from_world,
             axes: vec![None; moving],
-            projections: projection.repeat(batch),
+            projections: Vec::new(),
             background: Background {
                 projection,
                 gradients: comparison.gradients.clone(),
                 total,
                 cost_area: area_sums(&costs, centers.width()),
             },
-            drawn: vec![PixelRect::EMPTY; batch],
+            drawn: Vec::new(),
             comparison,
             derived: PixelRect::EMPTY,
-            poses: Vec::with_capacity(batch),
-            touched: vec![PixelRect::EMPTY; batch],
+            poses: Vec::new(),
+            touched: Vec::new(),
             fixed,
         }
     }
@@ -107,13 +106,24 @@ impl ViewCost {
         projector: &mut dyn Projector,
         costs: &mut [f64],
     ) {
-        let batch = self.drawn.len();
+        let batch = projector.batch().min(costs.len()).max(1);
+        self.make_room(batch);
         let poses = world_from_volume.chunks(batch * moving.len());
         for (costs, poses) in costs.chunks_mut(batch).zip(poses) {
             self.project(moving, poses, projector);
             for (number, cost) in costs.iter_mut().enumerate() {
                 *cost += self.similarity(number);
             }
+        }
+    }
+
+    /// Makes room for as many projections, which allocates when there were never as many before.
+    fn make_room(&mut self, batch: usize) {
+        while self.drawn.len() < batch {
+            self.projections
+                .extend_from_slice(&self.background.projection);
+            self.drawn.push(PixelRect::EMPTY);
+            self.touched.push(PixelRect::EMPTY);
         }
     }
 

@@ -124,8 +124,8 @@ struct Job {
 
 impl SliceResampling {
     /// Poses of a batch: enough that a group of slices is used many times while it is near the
-    /// processor, few enough that their sums are too.
-    const BATCH: usize = 8;
+    /// processor, few enough that their sums are too. The paper's populations are multiples of it.
+    const BATCH: usize = 20;
     /// A bone nearer to the source than this part of the way to the detector is cast.
     const NEAREST: f64 = 0.1;
 
