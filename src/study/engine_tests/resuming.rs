@@ -122,14 +122,14 @@ fn failures_are_rows_with_their_reason_and_can_be_redone() {
     let again = Fake::default();
     assert_eq!(
         run_with(results.path(), &again, 4, Redo::Nothing)
-            .study
+            .share
             .failed,
         9
     );
     assert_eq!(again.made.load(Ordering::SeqCst), 0);
     assert_eq!(
         run_with(results.path(), &again, 4, Redo::Failed)
-            .study
+            .share
             .failed,
         0
     );
