@@ -90,6 +90,17 @@ impl Attempt {
         Some((attempt, rows))
     }
 
+    /// True when something would be lost with it: rows, what is known of deaths, or a change that its
+    /// user accepted.
+    pub(super) fn left_a_trace(&self) -> bool {
+        let accepted = self.provenance["accepted"].as_array();
+        let suspects = self.died() && !self.in_work.is_empty();
+        self.rows > 0
+            || !self.crashed.is_empty()
+            || suspects
+            || accepted.is_some_and(|keys| !keys.is_empty())
+    }
+
     /// True when it ended without a word: what it had in work may be the cause.
     pub fn died(&self) -> bool {
         !self.alive && self.end.is_none()

@@ -24,8 +24,7 @@ impl Store {
         let (_, sign) = signs_of_life(path)?;
         let journal = journal::read(path)?;
         if let Some((attempt, rows)) = Attempt::of(journal, self.key_of, sign, false) {
-            let trace = attempt.died() && !attempt.in_work.is_empty();
-            if !rows.is_empty() || !attempt.crashed.is_empty() || trace {
+            if attempt.left_a_trace() {
                 parts::write(&self.parts, vec![attempt], &rows)?;
             }
         }

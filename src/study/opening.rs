@@ -28,14 +28,14 @@ impl Default for OpenOptions {
 }
 
 /// Looks whether a study may go on with this configuration and specimens of these fingerprints, fixes the
-/// process' level of vector instructions to that of the study, and gives the attempts so far.
-/// Changes no file.
+/// process' level of vector instructions to that of the study, and gives the attempts so far and the
+/// keys of accepted changes. Changes no file.
 pub(super) fn examine(
     folder: &StudyFolder,
     config: &Config,
     specimens: &BTreeMap<String, String>,
     options: &OpenOptions,
-) -> Result<Vec<Attempt>, StudyError> {
+) -> Result<(Vec<Attempt>, Vec<String>), StudyError> {
     check_format(folder)?;
     let attempts = folder.store().attempts()?;
     select_simd(&attempts)?;
@@ -49,7 +49,7 @@ pub(super) fn examine(
             keys,
         });
     }
-    Ok(attempts)
+    Ok((attempts, changes.into_iter().map(|(key, _)| key).collect()))
 }
 
 /// A newer program may have laid out the folder in a way that this one would spoil.

@@ -21,6 +21,9 @@ pub struct Provenance {
     /// Fingerprint of the files of each specimen that has some, by its name.
     #[serde(default)]
     pub specimens: BTreeMap<String, String>,
+    /// What differed from the attempts before and was accepted by name.
+    #[serde(default)]
+    pub accepted: Vec<String>,
     /// Level of vector instructions.
     pub simd: SimdLevel,
     pub host: String,
@@ -67,6 +70,7 @@ impl Provenance {
             commit: env!("PAO_SIM_COMMIT").into(),
             config: config.hash(),
             specimens,
+            accepted: Vec::new(),
             simd: SimdLevel::current(),
             host: first_line("/proc/sys/kernel/hostname").unwrap_or_else(|| "unknown".into()),
             platform: format!("{}-{}", std::env::consts::OS, std::env::consts::ARCH),

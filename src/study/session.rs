@@ -14,7 +14,7 @@ use crate::store::{COMPLETE, End, Record, Row, durable};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// A study of which this process has a share.
 #[derive(Debug)]
@@ -66,6 +66,10 @@ pub struct Outcome {
     pub recorded: (usize, usize),
 }
 
+/// How long a share that somebody has is waited for: a process that was killed a moment ago may not be
+/// gone yet.
+const GOING: Duration = Duration::from_millis(if cfg!(test) { 100 } else { 2000 });
+
 /// Journals of dead attempts that one process seals while others wait for the lock.
 const SEALED_AT_ONCE: usize = 64;
 
@@ -89,11 +93,19 @@ impl Study {
         }
         // Before others have to wait: the files of specimens are large.
         let specimens = fingerprints(&config.population)?;
-        let lock = folder.lock()?;
-        crate::fail_point!("open.locked");
-        let attempts = examine(&folder, &config, &specimens, options)?;
         let plan = Plan::of(&config);
-        check_free(&folder, &config, &plan, options.shard, &attempts)?;
+        let begin = Instant::now();
+        let (lock, attempts, accepted) = loop {
+            let lock = folder.lock()?;
+            crate::fail_point!("open.locked");
+            let (attempts, accepted) = examine(&folder, &config, &specimens, options)?;
+            match check_free(&folder, &config, &plan, options.shard, &attempts) {
+                Ok(()) => break (lock, attempts, accepted),
+                Err(StudyError::Busy { .. }) if begin.elapsed() < GOING => drop(lock),
+                Err(error) => return Err(error),
+            }
+            std::thread::sleep(Duration::from_millis(50));
+        };
         let store = folder.store();
         store.seal_dead(SEALED_AT_ONCE)?;
         store.merge()?;
@@ -104,7 +116,10 @@ impl Study {
             folder.write(&file, &text)?;
         }
         let next = attempts.last().map_or(1, |last| last.attempt + 1);
-        let provenance = Provenance::now(&config, specimens, threads);
+        let provenance = Provenance {
+            accepted,
+            ..Provenance::now(&config, specimens, threads)
+        };
         let provenance = serde_json::to_value(provenance).expect("provenance is plain data");
         let journal = Writer::create(&folder.journals(), next, options.shard.parts(), provenance)?;
         crate::fail_point!("open.journal_made");
@@ -292,7 +307,7 @@ pub fn preview(
 ) -> Result<Counts, StudyError> {
     let folder = StudyFolder::of(results, &config.study.name);
     let specimens = fingerprints(&config.population)?;
-    let attempts = examine(&folder, config, &specimens, options)?;
+    let (attempts, _) = examine(&folder, config, &specimens, options)?;
     let plan = Plan::of(config);
     check_free(&folder, config, &plan, options.shard, &attempts)?;
     let state = State::of(folder.store().read()?)?;
