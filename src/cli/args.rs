@@ -1,7 +1,7 @@
 //! The arguments, and which subcommand they go to.
 
 use super::error::{Exit, Failure};
-use super::{isolated, plan, replay, report, run, show, specimen, status};
+use super::{isolated, plan, replay, report, run, show, slurm, specimen, status};
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -37,6 +37,8 @@ enum Command {
     Run(run::Arguments),
     /// Count what a study consists of, before anything runs.
     Plan(plan::Arguments),
+    /// Write the job scripts of a study for Slurm, and submit them.
+    Slurm(slurm::Arguments),
     /// Tell how far a study is.
     Status(status::Arguments),
     /// Write the tables and figures of whatever is there.
@@ -58,6 +60,7 @@ pub fn main() -> ExitCode {
     let result = match &arguments.command {
         Command::Run(own) => run::main(own, common),
         Command::Plan(own) => plan::main(own, common),
+        Command::Slurm(own) => slurm::main(own, common),
         Command::Status(own) => status::main(own, common),
         Command::Report(own) => report::main(own, common),
         Command::Replay(own) => replay::main(own, common),

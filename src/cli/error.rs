@@ -1,5 +1,6 @@
 //! Failures of commands, and the exit codes.
 
+use pao_sim::study::slurm::SlurmError;
 use pao_sim::study::{KeyError, StudyError};
 
 /// The documented exit codes.
@@ -35,6 +36,8 @@ pub enum Failure {
     Specimen(#[from] pao_sim::anatomy::SpecimenError),
     #[error(transparent)]
     Import(#[from] pao_sim::anatomy::surfaces::ImportError),
+    #[error(transparent)]
+    Slurm(#[from] SlurmError),
     #[error("{phase}: {message}", phase = .0.phase, message = .0.message)]
     Work(pao_sim::study::Failure),
     #[error("{0}")]
@@ -62,6 +65,7 @@ impl Failure {
                 | StudyError::Newer { .. }
                 | StudyError::Guarded { .. },
             )
+            | Self::Slurm(SlurmError::Value { .. } | SlurmError::Path { .. })
             | Self::Usage(_)
             | Self::Key(_)
             | Self::NotPlanned(_) => Exit::Usage,

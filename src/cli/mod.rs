@@ -12,6 +12,7 @@ mod replay;
 mod report;
 mod run;
 mod show;
+mod slurm;
 mod specimen;
 mod status;
 mod stop;

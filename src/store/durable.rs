@@ -13,6 +13,26 @@ const TEMPORARY: &str = ".writing-";
 /// # Errors
 /// What `write` or the file system reports; `path` is then as it was.
 pub fn write(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    write_with(path, 0o666, write)
+}
+
+/// The same for a file that can be executed.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_executable(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<()> {
+    write_with(path, 0o777, write)
+}
+
+/// Permissions are less what the process' umask takes.
+fn write_with(
+    path: &Path,
+    permissions: u32,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<()> {
     let folder = match path.parent() {
         Some(folder) if folder != Path::new("") => folder,
         _ => Path::new("."),
@@ -21,7 +41,9 @@ pub fn write(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) 
     builder.prefix(TEMPORARY);
     // A temporary file is for its owner only; a study's folder is often shared.
     #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(permissions));
+    #[cfg(not(unix))]
+    let _ = permissions;
     let temporary = builder.tempfile_in(folder)?;
     let mut out = BufWriter::new(temporary.as_file());
     crate::fail_point!("write.begun");

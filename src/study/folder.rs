@@ -182,6 +182,16 @@ impl StudyFolder {
         self.path.join("parts")
     }
 
+    /// Copies of programs that jobs run, each under its content's hash.
+    pub fn programs(&self) -> PathBuf {
+        self.path.join("bin")
+    }
+
+    /// Job scripts, and the configurations that they run.
+    pub fn slurm(&self) -> PathBuf {
+        self.path.join("slurm")
+    }
+
     /// The records of the study.
     pub fn store(&self) -> Store {
         Store {

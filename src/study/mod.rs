@@ -26,6 +26,7 @@ pub mod scenario;
 pub mod session;
 pub mod shard;
 mod shared;
+pub mod slurm;
 pub mod snapshot;
 pub mod state;
 pub mod status;
