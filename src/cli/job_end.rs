@@ -9,8 +9,9 @@ const PATIENCE: Duration = Duration::from_secs(15);
 /// Time until the Slurm job that this process belongs to ends: from its environment, or asked once from
 /// `squeue`. `None` outside of a job, or when nobody knows.
 pub fn time_left() -> Option<Duration> {
-    let job = std::env::var("SLURM_JOB_ID").ok()?;
-    if let Some(end) = std::env::var("SLURM_JOB_END_TIME").ok()
+    let variable = |name: &str| std::env::var(name).ok();
+    let job = job(&variable)?;
+    if let Some(end) = variable("SLURM_JOB_END_TIME")
         && let Ok(end) = end.parse::<u64>()
     {
         let now = SystemTime::now().duration_since(UNIX_EPOCH).ok()?;
@@ -23,6 +24,14 @@ pub fn time_left() -> Option<Duration> {
         );
     }
     answer
+}
+
+/// The job as squeue knows exactly one: a task of an array by the array and its index. One of the tasks has the
+/// array's own number, by which squeue tells of all of them.
+fn job(variable: &dyn Fn(&str) -> Option<String>) -> Option<String> {
+    let job = variable("SLURM_JOB_ID")?;
+    let array = variable("SLURM_ARRAY_JOB_ID").zip(variable("SLURM_ARRAY_TASK_ID"));
+    Some(array.map_or(job, |(array, task)| format!("{array}_{task}")))
 }
 
 fn ask(job: &str) -> Option<Duration> {
@@ -60,6 +69,24 @@ fn parse(text: &str) -> Option<Duration> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_task_of_an_array_is_told_from_the_array() {
+        let job_of = |variables: &[(&str, &str)]| {
+            job(&|name| {
+                let found = variables.iter().find(|(known, _)| *known == name);
+                found.map(|(_, value)| (*value).to_owned())
+            })
+        };
+        assert_eq!(job_of(&[]), None);
+        assert_eq!(job_of(&[("SLURM_JOB_ID", "7")]).as_deref(), Some("7"));
+        let task = [
+            ("SLURM_JOB_ID", "9"),
+            ("SLURM_ARRAY_JOB_ID", "7"),
+            ("SLURM_ARRAY_TASK_ID", "1"),
+        ];
+        assert_eq!(job_of(&task).as_deref(), Some("7_1"));
+    }
 
     #[test]
     fn squeues_times_are_read() {
