@@ -23,10 +23,10 @@ impl Store {
     pub fn seal(&self, path: &Path) -> Result<(), StoreError> {
         let (_, sign) = signs_of_life(path)?;
         let journal = journal::read(path)?;
-        if let Some((attempt, rows)) = Attempt::of(journal, self.key_of, sign, false) {
-            if attempt.left_a_trace() {
-                parts::write(&self.parts, vec![attempt], &rows)?;
-            }
+        if let Some((attempt, rows)) = Attempt::of(journal, self.key_of, sign, false)
+            && attempt.left_a_trace()
+        {
+            parts::write(&self.parts, vec![attempt], &rows)?;
         }
         crate::fail_point!("seal.before_removal");
         std::fs::remove_file(path).map_err(StoreError::io("remove", path))?;
