@@ -19,7 +19,13 @@ fail() {
 [ $# -gt 0 ] || fail "give the command that is to run beside the cluster, such as bash"
 [ "$(id -u)" = 0 ] || fail "needs root, because slurmd starts jobs as their users"
 
-if ! command -v munged slurmctld slurmd sbatch >/dev/null; then
+# Daemons lie where not every root looks.
+PATH=$PATH:/usr/sbin:/sbin
+missing=
+for program in munged slurmctld slurmd sbatch; do
+    command -v "$program" >/dev/null || missing=yes
+done
+if [ "$missing" ]; then
     command -v apt-get >/dev/null || fail "needs ${packages[*]}; install them (there is no apt-get here to do it)"
     echo "real_slurm.sh: installs ${packages[*]}" >&2
     # Without a policy against it, a package's installation would start its daemon with the system's configuration.
