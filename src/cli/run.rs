@@ -6,6 +6,7 @@ use super::isolated::OwnProcess;
 use super::output::say;
 use super::progress::Progress;
 use super::{job_end, logging, report, stop};
+use pao_sim::study::slurm::shell_words;
 use pao_sim::study::{
     CaseWorker, Config, Counts, Ending, OpenOptions, Outcome, Redo, RunOptions, Shard, Snapshot,
     Stop, Study, StudyFolder, preview, throw_away,
@@ -194,11 +195,8 @@ fn tell_stopped(done: usize, planned: usize, failed: Option<usize>, common: &Com
     if common.json {
         return say!("{}", counts_line(done, planned, failed, true));
     }
-    let command: Vec<String> = std::env::args().map(|word| quoted(&word)).collect();
-    eprintln!(
-        "stopped: {done} of {planned} registrations are there; to continue: {}",
-        command.join(" ")
-    );
+    let command = shell_words(std::env::args_os().map(|word| word.to_string_lossy().into_owned()));
+    eprintln!("stopped: {done} of {planned} registrations are there; to continue: {command}");
 }
 
 fn counts_line(
@@ -208,16 +206,6 @@ fn counts_line(
     stopped: bool,
 ) -> serde_json::Value {
     serde_json::json!({ "planned": planned, "done": done, "failed": failed, "stopped": stopped })
-}
-
-/// A word as a shell takes it.
-fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', "'\\''"))
-    }
 }
 
 /// Reads `90s`, `45m`, `11.5h` or plain seconds.
@@ -241,13 +229,6 @@ fn time(text: &str) -> Result<Duration, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn words_are_quoted_for_a_shell() {
-        assert_eq!(quoted("--shard=1/4"), "--shard=1/4");
-        assert_eq!(quoted("my study.toml"), "'my study.toml'");
-        assert_eq!(quoted("it's"), "'it'\\''s'");
-    }
 
     #[test]
     fn times_have_units() {

@@ -10,7 +10,7 @@ use super::snapshot::write_table;
 use super::state::{Left, crashed_row};
 use super::{Config, Plan, Provenance, Shard, State, Worker};
 use crate::store::journal::Writer;
-use crate::store::{COMPLETE, End, Record, Row, durable};
+use crate::store::{Attempt, COMPLETE, End, Record, Row, durable};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
@@ -123,7 +123,7 @@ impl Study {
         let provenance = serde_json::to_value(provenance).expect("provenance is plain data");
         let journal = Writer::create(&folder.journals(), next, options.shard.parts(), provenance)?;
         crate::fail_point!("open.journal_made");
-        write_manifest(&folder, &config)?;
+        write_manifest(&folder, &config, &store.attempts()?)?;
         // From here on the journal keeps others off the share, and whoever had it before is over.
         drop(lock);
         let mut state = State::of(store.read()?)?;
@@ -165,9 +165,13 @@ impl Study {
         let left = self
             .state
             .left(&self.plan, self.shard, |row| redo.wants(row));
+        let shard = self.shard;
         let committed = Mutex::new(Vec::new());
         let keep = |event: Event| {
-            if let Event::Row(row) = event {
+            // The rows of a whole study are read back at the end anyway.
+            if let Event::Row(row) = event
+                && !shard.is_whole()
+            {
                 let mut rows = committed.lock().unwrap_or_else(PoisonError::into_inner);
                 rows.push(row.clone());
             }
@@ -186,17 +190,18 @@ impl Study {
             folder,
             config,
             plan,
-            shard,
             mut state,
             journal,
+            ..
         } = self;
         let lock = folder.lock()?;
         let (path, store) = (journal.path().to_owned(), folder.store());
         drop(journal);
         store.seal(&path)?;
         store.merge()?;
-        write_manifest(&folder, &config)?;
-        let recorded: usize = store.attempts()?.iter().map(|a| a.rows).sum();
+        let attempts = store.attempts()?;
+        write_manifest(&folder, &config, &attempts)?;
+        let recorded: usize = attempts.iter().map(|a| a.rows).sum();
         // Reading every row is worth it only when the study may be complete.
         let study = if shard.is_whole() || recorded >= plan.len() {
             state = State::of(store.read()?)?;
@@ -363,10 +368,12 @@ fn counts_with(plan: &Plan, state: &State, shard: Shard, redo: Redo) -> Counts {
 }
 
 /// `manifest.json`: the provenance of every attempt, from their records.
-fn write_manifest(folder: &StudyFolder, config: &Config) -> Result<(), StudyError> {
-    let attempts: Vec<Value> = folder
-        .store()
-        .attempts()?
+fn write_manifest(
+    folder: &StudyFolder,
+    config: &Config,
+    attempts: &[Attempt],
+) -> Result<(), StudyError> {
+    let attempts: Vec<Value> = attempts
         .iter()
         .map(|attempt| {
             let shard = Shard::new(attempt.share.0, attempt.share.1);

@@ -80,6 +80,9 @@ mod tests {
         assert_eq!(shell("it's $HOME"), r"'it'\''s $HOME'");
         assert_eq!(shell(""), "''");
         assert_eq!(shell_words(["a", "b c"]), "a 'b c'");
+        assert_eq!(shell_words(["--shard=1/4"]), "--shard=1/4");
+        assert_eq!(shell_words(["my study.toml"]), "'my study.toml'");
+        assert_eq!(shell_words(["it's"]), r"'it'\''s'");
         assert_eq!(sbatch("[a|b]"), "\"[a|b]\"");
         assert_eq!(sbatch(r#"a "b" \c"#), r#""a \"b\" \\c""#);
         assert_eq!(file_pattern("/100%/a"), "/100%%/a");
