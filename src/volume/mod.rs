@@ -3,17 +3,23 @@
 pub mod components;
 pub mod cubic;
 pub mod distance;
+mod file_error;
 pub mod grid;
 pub mod morphology;
 pub mod nifti;
+mod place;
+mod samples;
 pub mod surface;
 #[cfg(test)]
 pub(crate) mod surface_block;
 mod surface_field;
 mod surface_nets;
 pub mod surface_query;
+mod voxel;
 
-pub use self::nifti::{NiftiFileError, read_nifti, write_nifti};
+pub use self::nifti::{read_nifti, write_nifti};
+pub use file_error::VolumeFileError;
 pub use grid::{Grid, Volume};
 pub use surface::{Surface, SurfaceParameters};
 pub use surface_query::Hit;
+pub use voxel::{Voxel, VoxelProblem};

@@ -1,7 +1,7 @@
 //! Why a specimen's folder could not be read or written.
 
 use crate::anatomy::SpecimenProblem;
-use crate::volume::NiftiFileError;
+use crate::volume::VolumeFileError;
 use std::path::PathBuf;
 
 /// Why a specimen's folder could not be read or written.
@@ -23,7 +23,7 @@ pub enum SpecimenError {
         problems: Vec<SpecimenProblem>,
     },
     #[error(transparent)]
-    Volume(#[from] NiftiFileError),
+    Volume(#[from] VolumeFileError),
 }
 
 /// One line a problem, so that all of them can be mended in one go.

@@ -5,8 +5,7 @@ use super::header::Header;
 use super::points::{parse_landmarks, parse_rims};
 use super::{CT_FILE, HEADER_FILE, LABELS_FILE, LANDMARKS_FILE, RIMS_FILE};
 use crate::anatomy::{Specimen, SpecimenProblem, specimen_problems};
-use crate::volume::nifti::NiftiVoxel;
-use crate::volume::{Volume, read_nifti};
+use crate::volume::{Volume, Voxel, read_nifti};
 use std::path::Path;
 
 /// Reads and checks a specimen's folder ([`super`] says what is in it).
@@ -80,7 +79,7 @@ fn parsed<T>(file: &str, (value, bad): (T, Vec<String>), problems: &mut Vec<Spec
     value
 }
 
-fn volume<T: NiftiVoxel>(
+fn volume<T: Voxel>(
     dir: &Path,
     file: &str,
     problems: &mut Vec<SpecimenProblem>,

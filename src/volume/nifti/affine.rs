@@ -1,16 +1,13 @@
 //! A grid's place in the world, in a NIfTI header.
 
-use crate::geometry::{Point, Vector};
+use crate::geometry::Vector;
 use crate::volume::Grid;
+use crate::volume::place::{check_finite, grid_from_affine};
 use ::nifti::NiftiHeader;
 use nalgebra::{Matrix3, Matrix3x4, Quaternion, Rotation3, UnitQuaternion};
 
 /// NIFTI_XFORM_SCANNER_ANAT: the coordinates are those of the scanner.
 const SCANNER_ANAT: i16 = 1;
-
-/// How far from a right angle two axes may be (the cosine): the rounding of a header's 32-bit
-/// floats stays far below, a gantry tilt far above.
-const MAX_COSINE: f64 = 1e-3;
 
 /// How far, in voxels, the sform and the qform may place the same voxel apart.
 const MAX_DISAGREEMENT_VOXELS: f64 = 0.5;
@@ -92,84 +89,9 @@ fn check_agreement(s: &Matrix3x4<f64>, q: &Matrix3x4<f64>, dims: [usize; 3]) -> 
     Ok(())
 }
 
-fn check_finite(ras_from_index: &Matrix3x4<f64>) -> Result<(), String> {
-    if ras_from_index.iter().all(|v| v.is_finite()) {
-        return Ok(());
-    }
-    Err(format!(
-        "its affine is not finite: {}",
-        rows(ras_from_index)
-    ))
-}
-
 fn grid_from_ras(ras_from_index: &Matrix3x4<f64>, dims: [usize; 3]) -> Result<Grid, String> {
-    if ras_from_index.iter().any(|v| !v.is_finite()) {
-        return Err(format!(
-            "its affine is not finite: {}",
-            rows(ras_from_index)
-        ));
-    }
     let lps_from_ras = Matrix3::from_diagonal(&Vector::new(-1.0, -1.0, 1.0));
-    let lps = lps_from_ras * ras_from_index;
-    let axes = lps.fixed_view::<3, 3>(0, 0).into_owned();
-    let spacing: [f64; 3] = std::array::from_fn(|a| axes.column(a).norm());
-    if spacing.iter().any(|&s| s < 1e-6) {
-        return Err(format!("its voxels have the size {spacing:?} mm"));
-    }
-    let mut direction = axes;
-    for (axis, size) in spacing.iter().enumerate() {
-        direction.column_mut(axis).scale_mut(1.0 / size);
-    }
-    for (a, b) in [(0, 1), (0, 2), (1, 2)] {
-        let cosine = direction.column(a).dot(&direction.column(b));
-        if cosine.abs() > MAX_COSINE {
-            return Err(format!(
-                "its axes {a} and {b} are not at right angles (a tilted gantry?); resample it to a \
-                 grid with right angles"
-            ));
-        }
-    }
-    Ok(Grid {
-        dims,
-        spacing,
-        origin: Point::from(lps.column(3).into_owned()),
-        direction: nearest_orthogonal(&direction),
-    })
-}
-
-/// The orthogonal matrix nearest to an almost orthogonal one: the header's 32-bit floats leave a
-/// rounding that would make a grid's two directions of mapping disagree.
-fn nearest_orthogonal(matrix: &Matrix3<f64>) -> Matrix3<f64> {
-    if exactly_orthogonal(matrix) {
-        return *matrix;
-    }
-    let mut m = *matrix;
-    // Newton's iteration for the polar factor converges quadratically from here.
-    for _ in 0..6 {
-        let inverse = m
-            .try_inverse()
-            .expect("axes checked to be at right angles have an inverse");
-        m = (m + inverse.transpose()) * 0.5;
-    }
-    m
-}
-
-/// True for the matrices of axis-aligned grids, which must pass without a change of any bit.
-fn exactly_orthogonal(matrix: &Matrix3<f64>) -> bool {
-    matrix.transpose() * matrix == Matrix3::identity()
-}
-
-fn rows(m: &Matrix3x4<f64>) -> String {
-    let row = |r: usize| {
-        format!(
-            "[{}, {}, {}, {}]",
-            m[(r, 0)],
-            m[(r, 1)],
-            m[(r, 2)],
-            m[(r, 3)]
-        )
-    };
-    format!("[{}, {}, {}]", row(0), row(1), row(2))
+    grid_from_affine(&(lps_from_ras * ras_from_index), dims)
 }
 
 /// Writes a grid's place into both forms of a header, which then agree.
@@ -210,6 +132,7 @@ pub(super) fn set_grid(header: &mut NiftiHeader, grid: &Grid) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Point;
 
     fn oblique(mirrored: bool) -> Grid {
         let mut direction = *Rotation3::from_euler_angles(0.3, -2.2, 0.9).matrix();

@@ -4,12 +4,10 @@
 //! nowhere else.
 
 mod affine;
-mod error;
 mod read;
 mod voxel;
 mod write;
 
-pub use error::NiftiFileError;
 pub use read::read_nifti;
-pub use voxel::{NiftiVoxel, VoxelProblem};
+pub use voxel::NiftiVoxel;
 pub use write::write_nifti;

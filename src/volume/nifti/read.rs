@@ -1,14 +1,15 @@
 //! Reading a volume.
 
 use super::affine::grid_of;
-use super::error::NiftiFileError;
-use super::voxel::NiftiVoxel;
-use crate::volume::Volume;
+use crate::volume::samples::{ByteOrder, SampleType, volume_of_samples};
+use crate::volume::{Volume, VolumeFileError, Voxel};
 use ::nifti::{Endianness, NiftiError, NiftiHeader, NiftiType};
 use flate2::read::MultiGzDecoder;
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read};
 use std::path::Path;
+
+const FORMAT: &str = "NIfTI-1 file (.nii or .nii.gz)";
 
 /// Bytes of a NIfTI-1 header; a single file's voxels start after it and 4 more.
 const HEADER_BYTES: u64 = 348;
@@ -20,37 +21,27 @@ const HEADER_BYTES: u64 = 348;
 /// # Errors
 /// When the file is no NIfTI-1 file, has not three dimensions, does not say where it lies (or
 /// says it twice, differently), is not in mm, ends too early, or holds a value that `T` cannot.
-pub fn read_nifti<T: NiftiVoxel>(path: &Path) -> Result<Volume<T>, NiftiFileError> {
+pub fn read_nifti<T: Voxel>(path: &Path) -> Result<Volume<T>, VolumeFileError> {
     let mut stream = open(path)?;
     let header = read_header(&mut stream, path)?;
     let dims = dimensions(&header, path)?;
     check_unit(&header, path)?;
-    let grid = grid_of(&header, dims).map_err(|reason| NiftiFileError::Affine {
+    let grid = grid_of(&header, dims).map_err(|reason| VolumeFileError::Place {
         path: path.into(),
-        reason,
+        reason: format!("{reason}; set a valid sform or qform in RAS mm"),
     })?;
-    let decode = decoder(&header, path)?;
-    let raw = read_raw(&mut stream, &header, grid.len(), path)?;
-    let mut data = Vec::with_capacity(grid.len());
-    let size = raw.len() / grid.len();
-    let scale = scaling(&header);
-    for (offset, bytes) in raw.chunks_exact(size).enumerate() {
-        let value = decode(bytes) * scale.0 + scale.1;
-        data.push(
-            T::from_file_value(value).map_err(|problem| NiftiFileError::Value {
-                path: path.into(),
-                voxel: grid.voxel(offset),
-                value,
-                problem,
-            })?,
-        );
-    }
-    Ok(Volume::new(grid, data))
+    let kind = sample_type(&header, path)?;
+    let raw = read_raw(&mut stream, &header, grid.len() * kind.size(), path)?;
+    let order = match header.endianness {
+        Endianness::Little => ByteOrder::Little,
+        Endianness::Big => ByteOrder::Big,
+    };
+    volume_of_samples(grid, &raw, (kind, order), scaling(&header), path)
 }
 
 /// The file's bytes, decompressed where it starts as gzip does, whatever its name.
-fn open(path: &Path) -> Result<Box<dyn Read>, NiftiFileError> {
-    let io = |source| NiftiFileError::Io {
+fn open(path: &Path) -> Result<Box<dyn Read>, VolumeFileError> {
+    let io = |source| VolumeFileError::Io {
         doing: "read",
         path: path.into(),
         source,
@@ -67,9 +58,10 @@ fn open(path: &Path) -> Result<Box<dyn Read>, NiftiFileError> {
     })
 }
 
-fn read_header(stream: &mut dyn Read, path: &Path) -> Result<NiftiHeader, NiftiFileError> {
-    let not_nifti = |reason: String| NiftiFileError::NotNifti {
+fn read_header(stream: &mut dyn Read, path: &Path) -> Result<NiftiHeader, VolumeFileError> {
+    let not_nifti = |reason: String| VolumeFileError::Format {
         path: path.into(),
+        format: FORMAT,
         reason,
     };
     let header = NiftiHeader::from_reader(stream).map_err(|error| match error {
@@ -79,7 +71,7 @@ fn read_header(stream: &mut dyn Read, path: &Path) -> Result<NiftiHeader, NiftiF
         NiftiError::Io(source) if source.kind() == ErrorKind::InvalidInput => {
             not_nifti(format!("it does not decompress ({source})"))
         }
-        NiftiError::Io(source) => NiftiFileError::Io {
+        NiftiError::Io(source) => VolumeFileError::Io {
             doing: "read",
             path: path.into(),
             source,
@@ -100,28 +92,28 @@ fn read_header(stream: &mut dyn Read, path: &Path) -> Result<NiftiHeader, NiftiF
     Ok(header)
 }
 
-fn dimensions(header: &NiftiHeader, path: &Path) -> Result<[usize; 3], NiftiFileError> {
+fn dimensions(header: &NiftiHeader, path: &Path) -> Result<[usize; 3], VolumeFileError> {
     // The standard's type is i16; the crate reads u16.
     let dim = header.dim.map(|d| d as i16);
     let used = (dim[0].clamp(0, 7)) as usize;
     let dims = &dim[1..=used];
     let three = used >= 3 && dims[..3].iter().all(|&d| d > 1) && dims[3..].iter().all(|&d| d == 1);
     if !three {
-        return Err(NiftiFileError::Dimensions {
+        return Err(VolumeFileError::Dimensions {
             path: path.into(),
-            dims: dims.to_vec(),
+            dims: dims.iter().map(|&d| d.into()).collect(),
         });
     }
     Ok([dims[0] as usize, dims[1] as usize, dims[2] as usize])
 }
 
-fn check_unit(header: &NiftiHeader, path: &Path) -> Result<(), NiftiFileError> {
+fn check_unit(header: &NiftiHeader, path: &Path) -> Result<(), VolumeFileError> {
     match header.xyzt_units & 0x07 {
         // 0: not stated; every tool that leaves it out means mm.
         0 | 2 => Ok(()),
-        code => Err(NiftiFileError::Unit {
+        code => Err(VolumeFileError::Unit {
             path: path.into(),
-            code,
+            found: format!("NIfTI unit code {code}"),
         }),
     }
 }
@@ -134,32 +126,47 @@ fn scaling(header: &NiftiHeader) -> (f64, f64) {
     }
 }
 
-fn data_type(header: &NiftiHeader, path: &Path) -> Result<NiftiType, NiftiFileError> {
-    header.data_type().map_err(|_| NiftiFileError::DataType {
-        path: path.into(),
-        code: header.datatype,
+fn sample_type(header: &NiftiHeader, path: &Path) -> Result<SampleType, VolumeFileError> {
+    Ok(match header.data_type() {
+        Ok(NiftiType::Uint8) => SampleType::U8,
+        Ok(NiftiType::Int8) => SampleType::I8,
+        Ok(NiftiType::Uint16) => SampleType::U16,
+        Ok(NiftiType::Int16) => SampleType::I16,
+        Ok(NiftiType::Uint32) => SampleType::U32,
+        Ok(NiftiType::Int32) => SampleType::I32,
+        Ok(NiftiType::Uint64) => SampleType::U64,
+        Ok(NiftiType::Int64) => SampleType::I64,
+        Ok(NiftiType::Float32) => SampleType::F32,
+        Ok(NiftiType::Float64) => SampleType::F64,
+        _ => {
+            return Err(VolumeFileError::DataType {
+                path: path.into(),
+                found: format!("NIfTI datatype {}", header.datatype),
+            });
+        }
     })
 }
 
 fn read_raw(
     stream: &mut dyn Read,
     header: &NiftiHeader,
-    voxels: usize,
+    expected: usize,
     path: &Path,
-) -> Result<Vec<u8>, NiftiFileError> {
-    let io = |source: std::io::Error| NiftiFileError::Io {
+) -> Result<Vec<u8>, VolumeFileError> {
+    let io = |source: std::io::Error| VolumeFileError::Io {
         doing: "read",
         path: path.into(),
         source,
     };
     let start = f64::from(header.vox_offset);
     if !(start >= HEADER_BYTES as f64 && start.fract() == 0.0) {
-        return Err(NiftiFileError::NotNifti {
+        return Err(VolumeFileError::Format {
             path: path.into(),
+            format: FORMAT,
             reason: format!("its voxels start at byte {start}, inside the header"),
         });
     }
-    let expected = (voxels * data_type(header, path)?.size_of()) as u64;
+    let expected = expected as u64;
     let skip = start as u64 - HEADER_BYTES;
     let mut raw = Vec::new();
     let mut read = || -> std::io::Result<()> {
@@ -174,50 +181,11 @@ fn read_raw(
         return Err(io(error));
     }
     if raw.len() as u64 != expected {
-        return Err(NiftiFileError::Truncated {
+        return Err(VolumeFileError::Truncated {
             path: path.into(),
             found: raw.len() as u64,
             expected,
         });
     }
     Ok(raw)
-}
-
-/// The function that turns a voxel's bytes into its unscaled value.
-fn decoder(header: &NiftiHeader, path: &Path) -> Result<fn(&[u8]) -> f64, NiftiFileError> {
-    macro_rules! number {
-        ($type:ty, $bytes:ident) => {
-            |raw: &[u8]| {
-                <$type>::$bytes(raw.try_into().expect("chunks have the datatype's size")) as f64
-            }
-        };
-    }
-    let little = header.endianness == Endianness::Little;
-    macro_rules! either {
-        ($type:ty) => {
-            if little {
-                number!($type, from_le_bytes)
-            } else {
-                number!($type, from_be_bytes)
-            }
-        };
-    }
-    Ok(match data_type(header, path)? {
-        NiftiType::Uint8 => |raw: &[u8]| f64::from(raw[0]),
-        NiftiType::Int8 => |raw: &[u8]| f64::from(raw[0] as i8),
-        NiftiType::Uint16 => either!(u16),
-        NiftiType::Int16 => either!(i16),
-        NiftiType::Uint32 => either!(u32),
-        NiftiType::Int32 => either!(i32),
-        NiftiType::Uint64 => either!(u64),
-        NiftiType::Int64 => either!(i64),
-        NiftiType::Float32 => either!(f32),
-        NiftiType::Float64 => either!(f64),
-        _ => {
-            return Err(NiftiFileError::DataType {
-                path: path.into(),
-                code: header.datatype,
-            });
-        }
-    })
 }

@@ -1,71 +1,25 @@
-//! The voxel types that are read and written.
+//! The voxel types that are written.
 
+use crate::volume::Voxel;
 use ::nifti::writer::WriterOptions;
 use ndarray::ArrayView3;
 
-/// Why a file's value has no place in a voxel type.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum VoxelProblem {
-    NotFinite,
-    OutOfRange { min: i64, max: i64 },
-    NotWhole,
-}
-
-impl std::fmt::Display for VoxelProblem {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::NotFinite => write!(f, "expected a finite number"),
-            Self::OutOfRange { min, max } => write!(f, "expected a number from {min} to {max}"),
-            Self::NotWhole => write!(f, "expected a whole number, as a label is"),
-        }
-    }
-}
-
-/// A voxel type of a specimen's volumes: `i16` for Hounsfield units, `u8` for labels.
-pub trait NiftiVoxel: Copy {
-    /// The voxel of a file's value after the header's scaling. Hounsfield units are rounded to the
-    /// nearest whole number, labels must be whole.
-    ///
-    /// # Errors
-    /// When the value is not finite, out of the type's range, or (labels) not whole.
-    fn from_file_value(value: f64) -> Result<Self, VoxelProblem>;
-
+/// A voxel type that NIfTI files can hold.
+pub trait NiftiVoxel: Voxel {
     /// Has the options write `values`, indexed [i, j, k].
     #[doc(hidden)]
     fn write(values: ArrayView3<Self>, options: &WriterOptions) -> ::nifti::Result<()>;
 }
 
-fn in_range(value: f64, min: i64, max: i64) -> Result<f64, VoxelProblem> {
-    if !value.is_finite() {
-        return Err(VoxelProblem::NotFinite);
-    }
-    let rounded = value.round();
-    if rounded < min as f64 || rounded > max as f64 {
-        return Err(VoxelProblem::OutOfRange { min, max });
-    }
-    Ok(rounded)
-}
-
-impl NiftiVoxel for i16 {
-    fn from_file_value(value: f64) -> Result<Self, VoxelProblem> {
-        in_range(value, i16::MIN.into(), i16::MAX.into()).map(|v| v as i16)
-    }
-
-    fn write(values: ArrayView3<Self>, options: &WriterOptions) -> ::nifti::Result<()> {
-        options.write_nifti(&values)
-    }
-}
-
-impl NiftiVoxel for u8 {
-    fn from_file_value(value: f64) -> Result<Self, VoxelProblem> {
-        let rounded = in_range(value, 0, u8::MAX.into())?;
-        if rounded != value {
-            return Err(VoxelProblem::NotWhole);
+macro_rules! nifti_voxel {
+    ($type:ty) => {
+        impl NiftiVoxel for $type {
+            fn write(values: ArrayView3<Self>, options: &WriterOptions) -> ::nifti::Result<()> {
+                options.write_nifti(&values)
+            }
         }
-        Ok(rounded as u8)
-    }
-
-    fn write(values: ArrayView3<Self>, options: &WriterOptions) -> ::nifti::Result<()> {
-        options.write_nifti(&values)
-    }
+    };
 }
+
+nifti_voxel!(i16);
+nifti_voxel!(u8);

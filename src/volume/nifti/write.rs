@@ -1,9 +1,8 @@
 //! Writing a volume.
 
 use super::affine::set_grid;
-use super::error::NiftiFileError;
 use super::voxel::NiftiVoxel;
-use crate::volume::Volume;
+use crate::volume::{Volume, VolumeFileError};
 use ::nifti::NiftiHeader;
 use ::nifti::writer::WriterOptions;
 use ndarray::{ArrayView3, ShapeBuilder};
@@ -16,13 +15,13 @@ use std::path::Path;
 ///
 /// # Errors
 /// When the name ends otherwise, a dimension is beyond the format's 32767, or the disk refuses.
-pub fn write_nifti<T: NiftiVoxel>(volume: &Volume<T>, path: &Path) -> Result<(), NiftiFileError> {
-    let io = |source| NiftiFileError::Io {
+pub fn write_nifti<T: NiftiVoxel>(volume: &Volume<T>, path: &Path) -> Result<(), VolumeFileError> {
+    let io = |source| VolumeFileError::Io {
         doing: "write",
         path: path.into(),
         source,
     };
-    let unwritable = |reason: String| NiftiFileError::Unwritable {
+    let unwritable = |reason: String| VolumeFileError::Unwritable {
         path: path.into(),
         reason,
     };
@@ -193,13 +192,16 @@ mod tests {
         let bytes = std::fs::read(&path).unwrap();
         std::fs::write(&path, &bytes[..bytes.len() - 40]).unwrap();
         let error = read_nifti::<i16>(&path).unwrap_err();
-        assert!(matches!(error, NiftiFileError::Truncated { .. }), "{error}");
+        assert!(
+            matches!(error, VolumeFileError::Truncated { .. }),
+            "{error}"
+        );
         std::fs::write(&path, b"\x1f\x8bgarbage that is no gzip stream").unwrap();
         let error = read_nifti::<i16>(&path).unwrap_err();
-        assert!(matches!(error, NiftiFileError::NotNifti { .. }), "{error}");
+        assert!(matches!(error, VolumeFileError::Format { .. }), "{error}");
         assert!(matches!(
             read_nifti::<i16>(Path::new("no/such.nii")),
-            Err(NiftiFileError::Io { .. })
+            Err(VolumeFileError::Io { .. })
         ));
     }
 
