@@ -3,6 +3,8 @@
 pub mod comparison;
 pub mod cpu_scorer;
 #[cfg(test)]
+mod cpu_scorer_tests;
+#[cfg(test)]
 mod direct;
 pub mod drr;
 mod lanes;

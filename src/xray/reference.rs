@@ -27,13 +27,20 @@ pub fn line_integrals(
 ) -> Image<f64> {
     let volume_from_camera = camera_from_volume.inverse();
     let mut image = Image::filled(camera.width, camera.height, 0.0);
+    // Beyond the ball around the volume every sample is zero.
+    let grid = &volume.grid;
+    let [i, j, k] = grid.dims.map(|n| (n as f64 - 1.0) / 2.0);
+    let depth = -(camera_from_volume * grid.point(i, j, k)).z;
+    let radius = (grid.center([0; 3]) - grid.point(i, j, k)).norm();
+    let end = (camera.source_detector_mm / step_mm).floor();
+    let first = ((depth - radius) / step_mm).floor().clamp(0.0, end) as usize;
+    let last = ((depth + radius) / step_mm).ceil().clamp(0.0, end) as usize;
     for y in 0..camera.height {
         for x in 0..camera.width {
             let ray = camera.ray(&Pixel::new(x as f64, y as f64));
             let length = step_mm / -ray.direction.z;
-            let samples = (camera.source_detector_mm / step_mm).floor() as usize;
             let mut sum = 0.0;
-            for k in 0..=samples {
+            for k in first..=last {
                 let world = volume_from_camera * ray.at(k as f64 * length);
                 sum += trilinear(volume, &volume.grid.index(&world));
             }
