@@ -195,4 +195,13 @@ for what, (header, data) in edits.items():
     file.write_text(header.replace("oblique_raw.raw", f"oblique_{what}.raw"))
     check(file, "oblique", hu)
 
+# A segmentation with Slicer's keys: three segments in one layer.
+layers = small.astype(np.uint8) % 4
+keys = {"Segmentation_SourceRepresentation": "Binary labelmap", "Segmentation_ReferenceImageExtentOffset": "10 20 30"}
+for n, (segment, label) in enumerate([("left hip", 2), ("right hip", 1), ("sacrum", 3)]):
+    keys |= {f"Segment{n}_Name": segment, f"Segment{n}_LabelValue": str(label), f"Segment{n}_Layer": "0"}
+file = out / "layers.seg.nrrd"
+nrrd.write(str(file), layers.T, nrrd_header("oblique", "LPS", encoding="gzip", **keys))
+check(file, "oblique", layers)
+
 print(sum(1 for _ in out.iterdir()), "files,", sum(f.stat().st_size for f in out.iterdir()), "bytes")
