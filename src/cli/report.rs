@@ -72,6 +72,7 @@ fn about(study: &Snapshot) -> About {
         description: section.description.clone(),
         reduced: section.reduced.clone(),
         seed: section.seed,
+        specimens: study.specimens(),
         planned,
         provenance: study.provenance_summary(),
     }

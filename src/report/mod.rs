@@ -12,6 +12,7 @@ pub mod reference;
 pub mod rows;
 pub mod sampling_table;
 pub mod specimen;
+pub mod specimens_table;
 pub mod table;
 pub mod tests_table;
 pub mod write;

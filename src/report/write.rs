@@ -4,8 +4,10 @@ use super::canvas::{self, FigureError};
 use super::histograms::{JointHistograms, LceHistograms};
 use super::numbers::{Summaries, Tests};
 use super::rows::Rows;
+use super::specimens_table::specimens;
 use super::table::Table;
 use super::{effort_table, errors_table, html, offsets_table, sampling_table, tests_table};
+use crate::anatomy::Source;
 use crate::statistics::StatisticsError;
 use crate::store::{COMPLETE, Role, SCHEMA, durable};
 use polars::prelude::{DataFrame, ParquetWriter};
@@ -21,6 +23,8 @@ pub struct About {
     pub reduced: String,
     /// Seed of the bootstrap.
     pub seed: u64,
+    /// Where each specimen comes from, in the study's order.
+    pub specimens: Vec<(String, Source)>,
     /// Planned registrations of each specimen and strategy.
     pub planned: BTreeMap<(String, String), usize>,
     /// With what the rows were made: what, and its values.
@@ -56,7 +60,7 @@ pub enum ReportError {
 /// `report.md` and `report.html` (one page without other files) hold all tables and figures; a folder
 /// for each group holds its tables as Markdown,
 /// CSV and LaTeX and its figures as SVG and PNG; `summaries.parquet` and `tests.parquet` hold the
-/// numbers; `columns.md` says what the columns of `registrations.parquet` are.
+/// numbers; `specimens.md` and `specimens.csv` say whose anatomy it is; `columns.md` says what the columns of `registrations.parquet` are.
 ///
 /// # Errors
 /// When a value is not finite or a file cannot be written.
@@ -81,6 +85,17 @@ pub fn write(rows: &Rows, about: &About, folder: &Path) -> Result<Vec<Group>, Re
             tests.add(&group.name, &complete)?;
             groups.push(group);
         }
+    }
+    if let Some(specimens) = specimens(&about.specimens) {
+        page += &(specimens.markdown() + "\n");
+        web += &html::table(&specimens);
+        write_file(
+            &folder.join("specimens.md"),
+            specimens.markdown().as_bytes(),
+        )?;
+        let path = folder.join("specimens.csv");
+        let csv = specimens.csv().map_err(std::io::Error::other);
+        write_file(&path, &csv.map_err(failed(&path))?)?;
     }
     let provenance = provenance(about);
     page += &(provenance.markdown() + "\n");
@@ -363,6 +378,16 @@ mod tests {
             description: "48 registrations that nobody made".into(),
             reduced: String::new(),
             seed: 7,
+            specimens: vec![(
+                "phantom-1".into(),
+                Source {
+                    kind: "phantom".into(),
+                    description: "nobody | made up".into(),
+                    licence: "none".into(),
+                    sex: "unknown".into(),
+                    assigned_density: true,
+                },
+            )],
             planned: BTreeMap::from([(("phantom-1".into(), "paper".into()), 96)]),
             provenance: vec![("commit".into(), vec!["abc".into(), "def".into()])],
         };
@@ -371,6 +396,13 @@ mod tests {
         assert_eq!(groups.len(), 1);
         let page = std::fs::read_to_string(folder.path().join("report.md")).unwrap();
         insta::assert_snapshot!(page);
+        let list = std::fs::read_to_string(folder.path().join("specimens.csv")).unwrap();
+        assert_eq!(
+            list.lines().last(),
+            Some("phantom-1,phantom,unknown,none,assigned by rule,nobody | made up")
+        );
+        let web = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+        assert!(web.contains("<td>assigned by rule</td>"), "{web}");
         let tests = Rows::read(&folder.path().join("tests.parquet")).unwrap();
         assert_eq!(tests.len(), 15);
         let summaries = Rows::read(&folder.path().join("summaries.parquet")).unwrap();

@@ -4,6 +4,7 @@
 //! of the modules below are nested as they are; [`super::config_file`] reads and checks a file.
 
 use super::key::is_name;
+use super::population_folder::specimens_in;
 use super::{Scenario, StrategyParameters};
 use crate::anatomy::phantom::PhantomParameters;
 use crate::anatomy::surfaces::SurfacesParameters;
@@ -78,8 +79,8 @@ pub struct PopulationSection {
     /// is named `phantom-1`). Default 6.
     #[serde(deserialize_with = "numbers")]
     pub phantoms: Vec<u32>,
-    /// Folders of specimens (`pao-sim specimen import` writes them); relative paths start at the
-    /// configuration's folder. Default none.
+    /// Folders of specimens (`pao-sim specimen import` writes them), or folders that hold such, which stand
+    /// for each of these by name; relative paths start at the configuration's folder. Default none.
     pub specimens: Vec<PathBuf>,
     /// Folders of closed bone surfaces (PLY, RAS, mm), each made into a specimen when it is first
     /// needed; relative paths as above. They carry no density: it is assigned by rule. Default none.
@@ -136,6 +137,19 @@ impl PopulationSection {
         let folders = self.specimens.iter().cloned().map(SpecimenSource::Folder);
         let surfaces = self.surfaces.iter().cloned().map(SpecimenSource::Surfaces);
         phantoms.chain(folders).chain(surfaces).collect()
+    }
+
+    /// Puts the specimens of a folder in its place; gives what is wrong with folders that hold none.
+    pub(super) fn expand_folders(&mut self) -> Vec<String> {
+        let mut problems = Vec::new();
+        let named = std::mem::take(&mut self.specimens);
+        for path in named {
+            match specimens_in(&path) {
+                Ok(found) => self.specimens.extend(found),
+                Err(problem) => problems.push(problem),
+            }
+        }
+        problems
     }
 
     /// Makes every path absolute; relative ones start at the folder of the configuration `file`.

@@ -15,25 +15,40 @@ use toml::de::{DeTable, DeValue, ValueDeserializer};
 pub type Environment<'a> = &'a dyn Fn(&str) -> Option<String>;
 
 impl Config {
-    /// Reads a configuration file, with `${NAME}` replaced by the environment's value.
+    /// Reads a configuration file, with `${NAME}` replaced by the environment's value and folders of specimens
+    /// by the specimens that they hold now.
     ///
     /// # Errors
     /// When the file cannot be read, or with all its mistakes: syntax, unknown keys, wrong types,
-    /// values out of range, variables that are not set.
+    /// values out of range, variables that are not set, folders without a specimen.
     pub fn read(file: &Path) -> Result<Self, ConfigError> {
-        let text = std::fs::read_to_string(file).map_err(|cause| ConfigError::Unreadable {
-            file: file.to_owned(),
-            cause,
-        })?;
-        Self::parse(&text, file, &|name| std::env::var(name).ok())
+        let environment = |name: &str| std::env::var(name).ok();
+        Self::parse_with(&text_of(file)?, file, &environment, Folders::Searched)
+    }
+
+    /// Reads the configuration that a study's folder keeps: its specimens are named, and are not looked for.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_kept(file: &Path) -> Result<Self, ConfigError> {
+        Self::parse(&text_of(file)?, file, &|_| None)
     }
 
     /// The same for a text; `file` gives messages, the study's default name, and the folder that
-    /// relative paths start from.
+    /// relative paths start from. Nothing is looked for on the disk.
     ///
     /// # Errors
     /// As [`Self::read`].
     pub fn parse(text: &str, file: &Path, environment: Environment) -> Result<Self, ConfigError> {
+        Self::parse_with(text, file, environment, Folders::AsNamed)
+    }
+
+    fn parse_with(
+        text: &str,
+        file: &Path,
+        environment: Environment,
+        folders: Folders,
+    ) -> Result<Self, ConfigError> {
         let mut source = Source {
             text,
             mistakes: Vec::new(),
@@ -49,6 +64,12 @@ impl Config {
             let whole = document.clone();
             let mut config = source.config(document, file);
             config.population.resolve_paths(file);
+            if folders == Folders::Searched {
+                for problem in config.population.expand_folders() {
+                    let key = "population.specimens";
+                    source.report(span_of(&whole, key), format!("{key} {problem}"));
+                }
+            }
             for (path, problem) in config.problems() {
                 let span = span_of(&whole, &path);
                 source.report(span, format!("{path} {problem}"));
@@ -68,6 +89,20 @@ impl Config {
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("a configuration has neither maps with other keys than strings nor other values that TOML lacks")
     }
+}
+
+/// What becomes of folders in `population.specimens` that hold specimens.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Folders {
+    AsNamed,
+    Searched,
+}
+
+fn text_of(file: &Path) -> Result<String, ConfigError> {
+    std::fs::read_to_string(file).map_err(|cause| ConfigError::Unreadable {
+        file: file.to_owned(),
+        cause,
+    })
 }
 
 /// The sections that are read as they stand.
@@ -384,6 +419,32 @@ photons = 3
         // What is written elsewhere means the same folders.
         let written = Config::parse(&config.to_toml(), Path::new("/x/study.toml"), &|_| None);
         assert_eq!(written.unwrap(), config);
+    }
+
+    #[test]
+    fn a_folder_of_specimens_is_expanded_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("my.toml");
+        std::fs::create_dir(folder.path().join("people")).unwrap();
+        let text = "[population]\nphantoms = 0\nspecimens = [\"gone\", \"people\"]\n";
+        std::fs::write(&file, text).unwrap();
+        let none = Config::read(&file).unwrap_err().to_string();
+        assert!(
+            none.contains("my.toml:3: population.specimens names"),
+            "{none}"
+        );
+        for name in ["b", "a"] {
+            let person = folder.path().join("people").join(name);
+            std::fs::create_dir(&person).unwrap();
+            std::fs::write(person.join("specimen.toml"), "").unwrap();
+        }
+        let config = Config::read(&file).unwrap();
+        let expected = ["gone", "people/a", "people/b"].map(|name| folder.path().join(name));
+        assert_eq!(config.population.specimens, expected);
+        // What the study keeps needs no data.
+        std::fs::write(&file, config.to_toml()).unwrap();
+        std::fs::remove_file(folder.path().join("people/a/specimen.toml")).unwrap();
+        assert_eq!(Config::read_kept(&file).unwrap(), config);
     }
 
     #[test]

@@ -125,8 +125,7 @@ pub(super) fn stored_config(folder: &StudyFolder) -> Result<Option<Config>, Stud
     if !file.is_file() {
         return Ok(None);
     }
-    let text = std::fs::read_to_string(&file).map_err(io("read", &file))?;
-    Ok(Some(Config::parse(&text, &file, &|_| None)?))
+    Ok(Some(Config::read_kept(&file)?))
 }
 
 /// Refuses a share of which a living attempt has a part.

@@ -1,6 +1,8 @@
 //! With what and where an attempt runs.
 
 use super::Config;
+use super::specimen_list::specimen_list;
+use crate::anatomy::Source;
 use crate::simd::SimdLevel;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -21,6 +23,9 @@ pub struct Provenance {
     /// Fingerprint of the files of each specimen that has some, by its name.
     #[serde(default)]
     pub specimens: BTreeMap<String, String>,
+    /// Where each specimen comes from, by its name.
+    #[serde(default)]
+    pub sources: BTreeMap<String, Source>,
     /// What differed from the attempts before and was accepted by name.
     #[serde(default)]
     pub accepted: Vec<String>,
@@ -70,6 +75,7 @@ impl Provenance {
             commit: env!("PAO_SIM_COMMIT").into(),
             config: config.hash(),
             specimens,
+            sources: specimen_list(&config.population),
             accepted: Vec::new(),
             simd: SimdLevel::current(),
             host: first_line("/proc/sys/kernel/hostname").unwrap_or_else(|| "unknown".into()),

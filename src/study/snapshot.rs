@@ -4,6 +4,7 @@ use super::fingerprint::fingerprints;
 use super::folder::{StudyError, StudyFolder};
 use super::opening::changes;
 use super::{Config, Plan, Provenance, State};
+use crate::anatomy::Source;
 use crate::simd::SimdLevel;
 use crate::store::{Attempt, Row, write_parquet};
 use std::collections::BTreeSet;
@@ -23,7 +24,7 @@ impl Snapshot {
     /// # Errors
     /// When its configuration or journals cannot be read.
     pub fn read(folder: StudyFolder) -> Result<Self, StudyError> {
-        let config = Config::read(&folder.config_file())?;
+        let config = Config::read_kept(&folder.config_file())?;
         let state = State::of(folder.store().read()?)?;
         Ok(Self {
             plan: Plan::of(&config),
@@ -67,6 +68,17 @@ impl Snapshot {
         let filled = summary.into_iter().filter(|(_, values)| !values.is_empty());
         filled
             .map(|(what, values)| (what, values.into_iter().collect()))
+            .collect()
+    }
+
+    /// Where each specimen of the plan comes from, as the last attempt found it.
+    pub fn specimens(&self) -> Vec<(String, Source)> {
+        let all = provenances(&self.state.attempts);
+        let last = |name: &String| all.iter().rev().find_map(|p| p.sources.get(name).cloned());
+        let names = self.config.population.sources();
+        let names = names.iter().map(|source| source.name());
+        names
+            .filter_map(|name| last(&name).map(|source| (name, source)))
             .collect()
     }
 

@@ -24,6 +24,8 @@ pub enum VolumeFileError {
         "{path} has the dimensions {dims:?}; expected three of more than one voxel each (and only 1 in any further one)"
     )]
     Dimensions { path: PathBuf, dims: Vec<i64> },
+    #[error("{path} says that it has {dims:?} voxels, more than any file holds")]
+    TooLarge { path: PathBuf, dims: [usize; 3] },
     #[error("{path} holds values of {found}; expected integers or floats of 8 to 64 bits")]
     DataType {
         path: PathBuf,

@@ -4,11 +4,17 @@ pub mod components;
 pub mod cubic;
 pub mod distance;
 mod file_error;
+#[cfg(test)]
+mod format_tests;
 pub mod grid;
+pub mod metaimage;
 pub mod morphology;
 pub mod nifti;
+pub mod nrrd;
 mod place;
+mod read;
 mod samples;
+mod source;
 pub mod surface;
 #[cfg(test)]
 pub(crate) mod surface_block;
@@ -17,9 +23,12 @@ mod surface_nets;
 pub mod surface_query;
 mod voxel;
 
+pub use self::metaimage::read_metaimage;
 pub use self::nifti::{read_nifti, write_nifti};
+pub use self::nrrd::{nrrd_segment_names, read_nrrd};
 pub use file_error::VolumeFileError;
 pub use grid::{Grid, Volume};
+pub use read::read_volume;
 pub use surface::{Surface, SurfaceParameters};
 pub use surface_query::Hit;
 pub use voxel::{Voxel, VoxelProblem};

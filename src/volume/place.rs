@@ -8,6 +8,9 @@ use nalgebra::{Matrix3, Matrix3x4};
 /// floats stays far below, a gantry tilt far above.
 const MAX_COSINE: f64 = 1e-3;
 
+/// The voxel sizes that are believed; beyond them the arithmetic of the axes may overflow.
+const SPACING_MM: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
+
 /// Says so when a number of an affine is none.
 pub(super) fn check_finite(affine: &Matrix3x4<f64>) -> Result<(), String> {
     if affine.iter().all(|v| v.is_finite()) {
@@ -28,7 +31,7 @@ pub(super) fn grid_from_affine(
     let lps = lps_from_index;
     let axes = lps.fixed_view::<3, 3>(0, 0).into_owned();
     let spacing: [f64; 3] = std::array::from_fn(|a| axes.column(a).norm());
-    if spacing.iter().any(|&s| s < 1e-6) {
+    if !spacing.iter().all(|s| SPACING_MM.contains(s)) {
         return Err(format!("its voxels have the size {spacing:?} mm"));
     }
     let mut direction = axes;

@@ -19,10 +19,11 @@ mod write;
 
 pub use error::SpecimenError;
 pub use header::FORMAT_VERSION;
-pub use read::read_specimen;
+pub use read::{read_source, read_specimen};
 pub use write::write_specimen;
 
-const HEADER_FILE: &str = "specimen.toml";
+/// The file that makes a folder a specimen.
+pub const HEADER_FILE: &str = "specimen.toml";
 const CT_FILE: &str = "ct.nii.gz";
 const LABELS_FILE: &str = "labels.nii.gz";
 const LANDMARKS_FILE: &str = "landmarks.csv";

@@ -4,7 +4,7 @@ use super::error::SpecimenError;
 use super::header::Header;
 use super::points::{parse_landmarks, parse_rims};
 use super::{CT_FILE, HEADER_FILE, LABELS_FILE, LANDMARKS_FILE, RIMS_FILE};
-use crate::anatomy::{Specimen, SpecimenProblem, specimen_problems};
+use crate::anatomy::{Source, Specimen, SpecimenProblem, specimen_problems};
 use crate::volume::{Volume, Voxel, read_nifti};
 use std::path::Path;
 
@@ -45,6 +45,21 @@ pub fn read_specimen(dir: &Path) -> Result<Specimen, SpecimenError> {
         found if found.is_empty() => Ok(specimen),
         found => Err(invalid(found)),
     }
+}
+
+/// Reads where a specimen comes from, and nothing else of its folder.
+///
+/// # Errors
+/// When `specimen.toml` is missing or cannot be read.
+pub fn read_source(dir: &Path) -> Result<Source, SpecimenError> {
+    let mut problems = Vec::new();
+    text(dir, HEADER_FILE, &mut problems)
+        .and_then(|t| keep(HEADER_FILE, Header::parse(&t), &mut problems))
+        .map(|header| header.source)
+        .ok_or_else(|| SpecimenError::Invalid {
+            place: dir.display().to_string(),
+            problems,
+        })
 }
 
 fn unreadable(file: &str, reason: String) -> SpecimenProblem {

@@ -11,10 +11,12 @@ mod parameters;
 mod sacrum;
 mod skeleton;
 mod soft_tissue;
+mod source;
 #[cfg(test)]
 mod tests;
 mod voxelize;
 mod wing;
 
 pub use parameters::PhantomParameters;
+pub use source::phantom_source;
 pub use voxelize::phantom;

@@ -6,7 +6,8 @@ use super::distance::smooth_step;
 use super::noise::Noise;
 use super::skeleton::{Bone, Skeleton, sided};
 use super::soft_tissue::SoftTissue;
-use crate::anatomy::{Label, Landmark, Landmarks, Side, Source, Specimen};
+use super::source::phantom_source;
+use crate::anatomy::{Label, Landmark, Landmarks, Side, Specimen};
 use crate::geometry::Point;
 use crate::random::{Purpose, stream};
 use crate::volume::{Grid, Volume};
@@ -43,16 +44,7 @@ pub fn phantom(number: u32, parameters: &PhantomParameters) -> Specimen {
     });
     Specimen {
         name,
-        source: Source {
-            kind: "phantom".to_owned(),
-            description: format!(
-                "built-in phantom {number} of population {}, voxels of {} mm",
-                parameters.seed, parameters.voxel_mm
-            ),
-            licence: "none".to_owned(),
-            sex: skeleton.build.sex.name().to_owned(),
-            assigned_density: true,
-        },
+        source: phantom_source(number, parameters),
         ct: Volume::new(grid.clone(), ct),
         labels: Volume::new(grid, labels),
         landmarks,

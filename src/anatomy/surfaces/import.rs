@@ -87,7 +87,7 @@ pub fn specimen_from_surfaces(
     let ct = assigned_ct(&list, &which, &body, &found, parameters, &mut stream);
     Ok(Specimen {
         name: origin.name.clone(),
-        source: source(origin, parameters),
+        source: surfaces_source(origin, parameters),
         ct,
         labels,
         landmarks: found.landmarks,
@@ -105,7 +105,8 @@ impl<'a> Bone<'a> {
     }
 }
 
-fn source(origin: &SurfacesOrigin, p: &SurfacesParameters) -> Source {
+/// What a specimen from surfaces is, for people.
+pub fn surfaces_source(origin: &SurfacesOrigin, p: &SurfacesParameters) -> Source {
     Source {
         kind: "surfaces".into(),
         description: format!(

@@ -8,6 +8,7 @@ mod read;
 mod voxel;
 mod write;
 
+pub(super) use read::is_nifti;
 pub use read::read_nifti;
 pub use voxel::NiftiVoxel;
 pub use write::write_nifti;

@@ -2,11 +2,11 @@
 
 use super::affine::grid_of;
 use crate::volume::samples::{ByteOrder, SampleType, volume_of_samples};
+use crate::volume::source;
 use crate::volume::{Volume, VolumeFileError, Voxel};
 use ::nifti::{Endianness, NiftiError, NiftiHeader, NiftiType};
-use flate2::read::MultiGzDecoder;
-use std::fs::File;
-use std::io::{BufReader, ErrorKind, Read};
+use flate2::bufread::MultiGzDecoder;
+use std::io::{ErrorKind, Read};
 use std::path::Path;
 
 const FORMAT: &str = "NIfTI-1 file (.nii or .nii.gz)";
@@ -31,7 +31,9 @@ pub fn read_nifti<T: Voxel>(path: &Path) -> Result<Volume<T>, VolumeFileError> {
         reason: format!("{reason}; set a valid sform or qform in RAS mm"),
     })?;
     let kind = sample_type(&header, path)?;
-    let raw = read_raw(&mut stream, &header, grid.len() * kind.size(), path)?;
+    let expected = source::raw_bytes(dims, kind, path)?;
+    skip_to_voxels(&mut stream, &header, path)?;
+    let raw = source::read_raw(&mut stream, expected, path)?;
     let order = match header.endianness {
         Endianness::Little => ByteOrder::Little,
         Endianness::Big => ByteOrder::Big,
@@ -39,19 +41,25 @@ pub fn read_nifti<T: Voxel>(path: &Path) -> Result<Volume<T>, VolumeFileError> {
     volume_of_samples(grid, &raw, (kind, order), scaling(&header), path)
 }
 
+/// True when a file's first bytes, or what they decompress to, are a NIfTI-1 header.
+pub(in crate::volume) fn is_nifti(start: &[u8]) -> bool {
+    let mut header = Vec::new();
+    let found = if start.starts_with(&[0x1f, 0x8b]) {
+        MultiGzDecoder::new(start)
+            .take(HEADER_BYTES)
+            .read_to_end(&mut header)
+    } else {
+        start.take(HEADER_BYTES).read_to_end(&mut header)
+    };
+    // The bytes may be cut off after the header.
+    let _ = found;
+    matches!(header.get(344..348), Some(b"n+1\0" | b"ni1\0"))
+}
+
 /// The file's bytes, decompressed where it starts as gzip does, whatever its name.
 fn open(path: &Path) -> Result<Box<dyn Read>, VolumeFileError> {
-    let io = |source| VolumeFileError::Io {
-        doing: "read",
-        path: path.into(),
-        source,
-    };
-    let mut file = File::open(path).map_err(io)?;
-    let mut start = Vec::new();
-    file.by_ref().take(2).read_to_end(&mut start).map_err(io)?;
-    let gzip = start == [0x1f, 0x8b];
-    let whole = BufReader::new(std::io::Cursor::new(start).chain(file));
-    Ok(if gzip {
+    let mut whole = source::open(path)?;
+    Ok(if source::is_gzip(&mut whole, path)? {
         Box::new(MultiGzDecoder::new(whole))
     } else {
         Box::new(whole)
@@ -147,17 +155,12 @@ fn sample_type(header: &NiftiHeader, path: &Path) -> Result<SampleType, VolumeFi
     })
 }
 
-fn read_raw(
+/// Moves on from the header's end to where its voxels start.
+fn skip_to_voxels(
     stream: &mut dyn Read,
     header: &NiftiHeader,
-    expected: usize,
     path: &Path,
-) -> Result<Vec<u8>, VolumeFileError> {
-    let io = |source: std::io::Error| VolumeFileError::Io {
-        doing: "read",
-        path: path.into(),
-        source,
-    };
+) -> Result<(), VolumeFileError> {
     let start = f64::from(header.vox_offset);
     if !(start >= HEADER_BYTES as f64 && start.fract() == 0.0) {
         return Err(VolumeFileError::Format {
@@ -166,26 +169,5 @@ fn read_raw(
             reason: format!("its voxels start at byte {start}, inside the header"),
         });
     }
-    let expected = expected as u64;
-    let skip = start as u64 - HEADER_BYTES;
-    let mut raw = Vec::new();
-    let mut read = || -> std::io::Result<()> {
-        std::io::copy(&mut stream.take(skip), &mut std::io::sink())?;
-        stream.take(expected).read_to_end(&mut raw)?;
-        Ok(())
-    };
-    // A gzip stream that was cut off ends with an error rather than quietly.
-    if let Err(error) = read()
-        && error.kind() != ErrorKind::UnexpectedEof
-    {
-        return Err(io(error));
-    }
-    if raw.len() as u64 != expected {
-        return Err(VolumeFileError::Truncated {
-            path: path.into(),
-            found: raw.len() as u64,
-            expected,
-        });
-    }
-    Ok(raw)
+    source::skip_bytes(stream, start as u64 - HEADER_BYTES, path)
 }

@@ -1,0 +1,171 @@
+//! The axes of the array: which of them lie in the world, and where.
+
+use super::header::Header;
+use crate::volume::place::grid_from_affine;
+use crate::volume::{Grid, VolumeFileError};
+use nalgebra::{Matrix3, Matrix3x4, Vector3};
+
+/// Words for a length of one millimetre; an empty one or `???` says nothing, and mm is meant then.
+const MILLIMETRE: [&str; 7] = [
+    "mm",
+    "millimeter",
+    "millimeters",
+    "millimetre",
+    "millimetres",
+    "",
+    "???",
+];
+
+/// The kinds of axes that lie in the world, or may.
+const SPATIAL: [&str; 4] = ["domain", "space", "???", "none"];
+
+/// The grid (LPS) that a header describes.
+///
+/// # Errors
+/// When it has not three axes of more than one voxel in the world, is not placed in LPS, RAS or LAS
+/// mm, or holds more than one value a voxel.
+pub(super) fn grid_of(header: &Header) -> Result<Grid, VolumeFileError> {
+    let sizes = header.sizes()?;
+    let lps = lps_from_space(header)?;
+    check_units(header)?;
+    let directions = directions(header, sizes.len())?;
+    check_kinds(header, &directions)?;
+    let spatial: Vec<usize> = (0..sizes.len())
+        .filter(|&axis| directions[axis].is_some())
+        .collect();
+    for axis in 0..sizes.len() {
+        if directions[axis].is_none() && sizes[axis] != 1 {
+            return Err(several_values(header, axis, sizes[axis]));
+        }
+    }
+    let &[i, j, k] = spatial.as_slice() else {
+        return Err(dimensions(header, &sizes));
+    };
+    let dims = [i, j, k].map(|axis| usize::try_from(sizes[axis]).unwrap_or(0));
+    if dims.iter().any(|&d| d < 2) {
+        return Err(dimensions(header, &sizes));
+    }
+    let origin = header.get("space origin").ok_or_else(|| {
+        let reason = "its header has no 'space origin'; write it anew with its place";
+        header.no_place(reason.into())
+    })?;
+    let origin = vector(origin).ok_or_else(|| {
+        header.no_place(format!(
+            "its 'space origin' is '{origin}'; expected (x,y,z)"
+        ))
+    })?;
+    let columns = [i, j, k].map(|axis| directions[axis].expect("a spatial axis has a direction"));
+    let [x, y, z] = columns.map(|column| lps * column);
+    let lps_from_index = Matrix3x4::from_columns(&[x, y, z, lps * origin]);
+    grid_from_affine(&lps_from_index, dims).map_err(|reason| header.no_place(reason))
+}
+
+fn dimensions(header: &Header, sizes: &[i64]) -> VolumeFileError {
+    VolumeFileError::Dimensions {
+        path: header.path().into(),
+        dims: sizes.to_vec(),
+    }
+}
+
+/// What turns vectors of the header's world into LPS.
+fn lps_from_space(header: &Header) -> Result<Matrix3<f64>, VolumeFileError> {
+    let space = header.get("space").map(str::to_ascii_lowercase);
+    let signs = match space.as_deref() {
+        Some("left-posterior-superior" | "lps") => [1.0, 1.0, 1.0],
+        Some("right-anterior-superior" | "ras") => [-1.0, -1.0, 1.0],
+        Some("left-anterior-superior" | "las") => [1.0, -1.0, 1.0],
+        other => {
+            let says = match other {
+                Some(space) => format!("its 'space' is '{space}'"),
+                None => "its header has no 'space'".into(),
+            };
+            return Err(header.no_place(format!(
+                "{says}, which does not tell left from right; write it anew as \
+                 left-posterior-superior, right-anterior-superior or left-anterior-superior"
+            )));
+        }
+    };
+    Ok(Matrix3::from_diagonal(&signs.into()))
+}
+
+fn check_units(header: &Header) -> Result<(), VolumeFileError> {
+    let units = header.get("space units").unwrap_or_default();
+    // Each is quoted: the odd pieces lie inside quotes.
+    for unit in units.split('"').skip(1).step_by(2) {
+        if !MILLIMETRE.contains(&unit.trim().to_ascii_lowercase().as_str()) {
+            return Err(VolumeFileError::Unit {
+                path: header.path().into(),
+                found: format!("'{unit}' ('space units')"),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Each axis' step in the header's world, `None` for an axis that does not lie in it.
+fn directions(header: &Header, axes: usize) -> Result<Vec<Option<Vector3<f64>>>, VolumeFileError> {
+    let Some(text) = header.get("space directions") else {
+        let reason = "its header has no 'space directions'; write it anew with its place";
+        return Err(header.no_place(reason.into()));
+    };
+    let wrong = || {
+        header.no_place(format!(
+            "its 'space directions' are '{text}'; expected (x,y,z) or none for each of {axes} axes"
+        ))
+    };
+    let mut found = Vec::new();
+    let mut rest = text.trim();
+    while !rest.is_empty() {
+        let (entry, after) = match rest.strip_prefix("none") {
+            Some(after) => (None, after),
+            None => {
+                let end = rest.find(')').ok_or_else(wrong)? + 1;
+                (Some(vector(&rest[..end]).ok_or_else(wrong)?), &rest[end..])
+            }
+        };
+        found.push(entry);
+        rest = after.trim_start();
+    }
+    if found.len() != axes {
+        return Err(wrong());
+    }
+    Ok(found)
+}
+
+/// `(x,y,z)`
+fn vector(text: &str) -> Option<Vector3<f64>> {
+    let inside = text.trim().strip_prefix('(')?.strip_suffix(')')?;
+    let numbers: Option<Vec<f64>> = inside.split(',').map(|n| n.trim().parse().ok()).collect();
+    let [x, y, z] = numbers?.try_into().ok()?;
+    Some(Vector3::new(x, y, z))
+}
+
+/// An axis of colours or moments has no direction; a file that gives it one contradicts itself.
+fn check_kinds(
+    header: &Header,
+    directions: &[Option<Vector3<f64>>],
+) -> Result<(), VolumeFileError> {
+    let kinds = header.get("kinds").unwrap_or_default();
+    for (axis, kind) in kinds.split_whitespace().enumerate() {
+        let spatial = SPATIAL.contains(&kind.to_ascii_lowercase().as_str());
+        if !spatial && matches!(directions.get(axis), Some(Some(_))) {
+            return Err(header.no_place(format!(
+                "its axis {axis} is of the kind '{kind}' and yet has a direction in space"
+            )));
+        }
+    }
+    Ok(())
+}
+
+fn several_values(header: &Header, axis: usize, values: i64) -> VolumeFileError {
+    if !header.segment_keys.is_empty() {
+        return header.wrong(format!(
+            "its segments overlap: they lie in {values} layers and a label map has one; in Slicer, export \
+             the segments that are needed as one label map (module Segmentations, Export/import \
+             models and labelmaps) and save that"
+        ));
+    }
+    header.wrong(format!(
+        "its axis {axis} does not lie in space and has {values} values; expected one value a voxel"
+    ))
+}

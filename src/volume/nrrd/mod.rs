@@ -1,0 +1,16 @@
+//! Volumes as NRRD files (`.nrrd`, and `.nhdr` with its data file), Slicer's segmentations
+//! (`.seg.nrrd`) included.
+//!
+//! The header names its world: LPS is ours, of RAS x and y change their sign, of LAS y, here and
+//! nowhere else. A header that names no such world is refused, since sides are never guessed.
+
+mod axes;
+mod header;
+mod read;
+mod segments;
+
+pub use read::read_nrrd;
+pub use segments::nrrd_segment_names;
+
+/// What a file is read as, for messages.
+const FORMAT: &str = "NRRD file (.nrrd or .nhdr)";

@@ -1,0 +1,101 @@
+//! Reading a volume.
+
+use super::FORMAT;
+use super::axes::grid_of;
+use super::header::Header;
+use crate::volume::samples::{ByteOrder, SampleType, volume_of_samples};
+use crate::volume::source;
+use crate::volume::{Volume, VolumeFileError, Voxel};
+use flate2::bufread::MultiGzDecoder;
+use std::path::{Path, PathBuf};
+
+/// Reads the volume of a `.nrrd` file, or of a `.nhdr` header and the file it names (relative to the
+/// header's folder), with values of any integer or float type, raw, compressed by gzip or as text.
+/// Its world is LPS in mm whichever the header has; oblique, mirrored and permuted axes are kept as
+/// they are. Axes outside space are passed over when they have one value.
+///
+/// A segmentation by Slicer (`.seg.nrrd`) is read as the label map it holds, where no segments
+/// overlap; [`super::nrrd_segment_names`] gives its labels' names. Slicer may have cropped it to what its
+/// segments need, so its grid is a part of its CT's.
+///
+/// # Errors
+/// When the file is no NRRD file, has not three dimensions in space, does not say where it lies in
+/// LPS, RAS or LAS mm, holds more than one value a voxel, is encoded otherwise or in several files,
+/// ends too early, or holds a value that `T` cannot.
+pub fn read_nrrd<T: Voxel>(path: &Path) -> Result<Volume<T>, VolumeFileError> {
+    let mut attached = source::open(path)?;
+    let header = Header::read(&mut attached, path)?;
+    let grid = grid_of(&header)?;
+    let kind = header.sample_type()?;
+    let expected = source::raw_bytes(grid.dims, kind, path)?;
+    let (mut file, path) = match data_file(&header)? {
+        Some(path) => (source::open(&path)?, path),
+        None => (attached, path.to_owned()),
+    };
+    let path = path.as_path();
+
+    let lines = not_negative(&header, "line skip")?;
+    source::skip_lines(&mut file, lines, path)?;
+    let encoding = header.needed("encoding")?.to_ascii_lowercase();
+    let raw = match encoding.as_str() {
+        "raw" => {
+            // -1: the voxels are the file's last bytes, whatever precedes them.
+            if header.whole("byte skip", 0)? == -1 {
+                source::skip_to_last(&mut file, expected, path)?;
+            } else {
+                source::skip_bytes(&mut file, not_negative(&header, "byte skip")?, path)?;
+            }
+            source::read_raw(&mut file, expected, path)?
+        }
+        "gz" | "gzip" => {
+            let mut stream = MultiGzDecoder::new(file);
+            source::skip_bytes(&mut stream, not_negative(&header, "byte skip")?, path)?;
+            source::read_raw(&mut stream, expected, path)?
+        }
+        "txt" | "text" | "ascii" => {
+            source::skip_bytes(&mut file, not_negative(&header, "byte skip")?, path)?;
+            return source::read_text(grid, &mut file, (path, FORMAT));
+        }
+        other => {
+            return Err(header.wrong(format!(
+                "its encoding is '{other}'; write it anew as raw or gzip (Slicer, pynrrd and teem's \
+                 unu save do so)"
+            )));
+        }
+    };
+    let order = byte_order(&header, kind)?;
+    volume_of_samples(grid, &raw, (kind, order), (1.0, 0.0), path)
+}
+
+/// The file that holds the voxels, where it is not the header's own.
+fn data_file(header: &Header) -> Result<Option<PathBuf>, VolumeFileError> {
+    let Some(name) = header.get("data file") else {
+        return Ok(None);
+    };
+    let list = name.split_whitespace().next() == Some("LIST");
+    if name.is_empty() || list || name.contains('%') {
+        return Err(header.wrong(format!(
+            "its voxels lie in several files ('data file: {name}'); write it anew as one .nrrd file"
+        )));
+    }
+    let folder = header.path().parent().unwrap_or(Path::new(""));
+    Ok(Some(folder.join(name)))
+}
+
+fn not_negative(header: &Header, field: &'static str) -> Result<u64, VolumeFileError> {
+    let number = header.whole(field, 0)?;
+    u64::try_from(number)
+        .map_err(|_| header.wrong(format!("its '{field}' is {number}; expected 0 or more")))
+}
+
+fn byte_order(header: &Header, kind: SampleType) -> Result<ByteOrder, VolumeFileError> {
+    match header.get("endian").map(str::to_ascii_lowercase).as_deref() {
+        Some("little") => Ok(ByteOrder::Little),
+        Some("big") => Ok(ByteOrder::Big),
+        None if kind.size() == 1 => Ok(ByteOrder::Little),
+        other => Err(header.wrong(format!(
+            "its 'endian' is '{}'; expected little or big",
+            other.unwrap_or_default()
+        ))),
+    }
+}
