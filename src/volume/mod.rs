@@ -2,6 +2,7 @@
 
 pub mod components;
 pub mod cubic;
+pub mod dicom;
 pub mod distance;
 mod file_error;
 pub mod grid;
@@ -17,6 +18,7 @@ mod surface_nets;
 pub mod surface_query;
 mod voxel;
 
+pub use self::dicom::{read_dicom_series, read_dicom_series_of};
 pub use self::nifti::{read_nifti, write_nifti};
 pub use file_error::VolumeFileError;
 pub use grid::{Grid, Volume};
