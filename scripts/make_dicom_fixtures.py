@@ -141,8 +141,8 @@ def main(out):
         RescaleIntercept=0,
         stored=lambda k: np.where(I + J == 0, [-32768, 32767, 0][k], hounsfield(k)),
     )
-    # 12 bits stored two bits above the lowest, with rubbish around them.
-    series(out, "high_bit", HighBit=13, stored=lambda k: ((hounsfield(k) + 1024) << 2) | 0x8003)
+    # 12 bits stored, with rubbish above them.
+    series(out, "rubbish_above", stored=lambda k: (hounsfield(k) + 1024) | 0xA000)
     # 12 signed bits, padded with zeros above them.
     series(
         out,
@@ -187,6 +187,7 @@ def main(out):
     series(out, "padding_in_range", PixelPaddingValue=1024)
 
     series(out, "tilt", shift=[0, STEP * np.tan(np.radians(15)), 0])
+    series(out, "high_bit", count=2, HighBit=13)
     series(out, "monochrome1", count=2, PhotometricInterpretation="MONOCHROME1")
     series(out, "no_rescale", count=2, RescaleSlope=None)
     series(out, "us_units", count=2, RescaleType="US")

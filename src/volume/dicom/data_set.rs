@@ -330,11 +330,7 @@ struct Walked {
 }
 
 /// Goes through a data set up to its pixels.
-fn walk(
-    source: &mut Box<dyn Source>,
-    syntax: Syntax,
-    bytes: u64,
-) -> Result<Walked, DicomProblem> {
+fn walk(source: &mut Box<dyn Source>, syntax: Syntax, bytes: u64) -> Result<Walked, DicomProblem> {
     let mut values = BTreeMap::new();
     if !starts_as(source, syntax)? {
         return Ok(Walked {

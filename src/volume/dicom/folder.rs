@@ -48,7 +48,11 @@ pub(super) fn series_in(
     }
     let told = ignored.told();
     if images.is_empty() {
-        let found = if told.is_empty() { "it is empty".into() } else { told };
+        let found = if told.is_empty() {
+            "it is empty".into()
+        } else {
+            told
+        };
         return Err(DicomProblem::NoSlices { found }.at(folder));
     }
     if !told.is_empty() {
@@ -62,7 +66,9 @@ fn files_in(folder: &Path, ignored: &mut Ignored) -> Result<Vec<PathBuf>, Volume
     for entry in std::fs::read_dir(folder).map_err(|e| io(folder, e))? {
         let path = entry.map_err(|e| io(folder, e))?.path();
         let kind = std::fs::metadata(&path).map_err(|e| io(&path, e))?;
-        let hidden = path.file_name().is_some_and(|n| n.as_encoded_bytes()[0] == b'.');
+        let hidden = path
+            .file_name()
+            .is_some_and(|n| n.as_encoded_bytes()[0] == b'.');
         if kind.is_dir() {
             ignored.folders += 1;
         } else if hidden || !kind.is_file() {
@@ -98,7 +104,9 @@ impl Ignored {
         let mut told: Vec<String> = lists
             .iter()
             .filter(|(files, _)| !files.is_empty())
-            .map(|(files, what)| format!("{} {what} ({})", count(files.len(), "file"), names(files)))
+            .map(|(files, what)| {
+                format!("{} {what} ({})", count(files.len(), "file"), names(files))
+            })
             .collect();
         if self.folders > 0 {
             told.push(count(self.folders, "subfolder"));
@@ -131,10 +139,12 @@ fn choose(images: Vec<DataSet>, wanted: Option<&str>) -> Result<Vec<DataSet>, Di
         series.entry(uid).or_default().push(image);
     }
     if let Some(uid) = wanted {
-        return series.remove(uid).ok_or_else(|| DicomProblem::NoSuchSeries {
-            wanted: uid.into(),
-            series: summaries(&series),
-        });
+        return series
+            .remove(uid)
+            .ok_or_else(|| DicomProblem::NoSuchSeries {
+                wanted: uid.into(),
+                series: summaries(&series),
+            });
     }
     if series.len() > 1 {
         return Err(DicomProblem::SeveralSeries(summaries(&series)));

@@ -19,15 +19,42 @@ impl Slice {
     /// # Errors
     /// When the pixels do not decode, or one of them is none that 16 bits can hold.
     pub fn read_into(&self, out: &mut [i16], k: usize) -> Result<(), VolumeFileError> {
-        let format = &self.format;
         let raw = self.raw_pixels()?;
         let order = self.data.syntax.byte_order();
-        for (offset, (bytes, voxel)) in raw.chunks_exact(format.bytes).zip(out).enumerate() {
-            let stored = format.from_bits(bits(bytes, order) >> format.shift);
-            let mut value = stored as f64 * format.slope + format.intercept;
-            if let Some((low, high)) = format.padding
-                && (low..=high).contains(&stored)
+        match (self.format.bytes, order) {
+            (1, _) => self.convert(&raw, |[byte]: [u8; 1]| byte.into(), out, k),
+            (2, ByteOrder::Little) => self.convert(&raw, |b| u16::from_le_bytes(b).into(), out, k),
+            (2, ByteOrder::Big) => self.convert(&raw, |b| u16::from_be_bytes(b).into(), out, k),
+            (_, ByteOrder::Little) => self.convert(&raw, u32::from_le_bytes, out, k),
+            (_, ByteOrder::Big) => self.convert(&raw, u32::from_be_bytes, out, k),
+        }
+    }
+
+    /// Turns the bytes of each number into Hounsfield units.
+    fn convert<const N: usize>(
+        &self,
+        raw: &[u8],
+        bits: impl Fn([u8; N]) -> u32,
+        out: &mut [i16],
+        k: usize,
+    ) -> Result<(), VolumeFileError> {
+        let format = &self.format;
+        // Whole numbers need no rounding.
+        let whole =
+            [format.slope, format.intercept].map(|v| (v.fract() == 0.0).then_some(v as i64));
+        for (offset, (bytes, voxel)) in raw.as_chunks::<N>().0.iter().zip(out).enumerate() {
+            let stored = format.from_bits(bits(*bytes));
+            let padding = format
+                .padding
+                .is_some_and(|(low, high)| (low..=high).contains(&stored));
+            if let ([Some(slope), Some(intercept)], false) = (whole, padding)
+                && let Ok(value) = i16::try_from(stored * slope + intercept)
             {
+                *voxel = value;
+                continue;
+            }
+            let mut value = stored as f64 * format.slope + format.intercept;
+            if padding {
                 value = value.max(AIR);
             }
             *voxel = i16::from_file_value(value).map_err(|problem| VolumeFileError::Value {
@@ -103,18 +130,5 @@ impl Slice {
         }
         items.remove(0);
         Ok(items)
-    }
-}
-
-/// The bits of a number of 1, 2 or 4 bytes.
-#[inline]
-fn bits(bytes: &[u8], order: ByteOrder) -> u32 {
-    match (bytes, order) {
-        (&[a], _) => a.into(),
-        (&[a, b], ByteOrder::Little) => u16::from_le_bytes([a, b]).into(),
-        (&[a, b], ByteOrder::Big) => u16::from_be_bytes([a, b]).into(),
-        (&[a, b, c, d], ByteOrder::Little) => u32::from_le_bytes([a, b, c, d]),
-        (&[a, b, c, d], ByteOrder::Big) => u32::from_be_bytes([a, b, c, d]),
-        _ => unreachable!("1, 2 or 4 bytes a pixel"),
     }
 }

@@ -38,8 +38,6 @@ pub(super) struct PixelFormat {
     /// 1, 2 or 4.
     pub bytes: usize,
     pub bits_stored: u32,
-    /// Unused bits below the stored ones.
-    pub shift: u32,
     pub signed: bool,
     pub slope: f64,
     pub intercept: f64,
@@ -163,8 +161,12 @@ fn pixel_format(data: &DataSet) -> Result<PixelFormat, VolumeFileError> {
         return Err(data.unexpected(tags::BITS_STORED, &stored.to_string(), &expected));
     }
     let high = whole(tags::HIGH_BIT)?;
-    if !(stored - 1..allocated).contains(&high) {
-        let expected = format!("{} to {}", stored - 1, allocated - 1);
+    if high != stored - 1 {
+        let expected = format!(
+            "{}, one less than BitsStored: programs differ in how they read anything else; export \
+             it again",
+            stored - 1
+        );
         return Err(data.unexpected(tags::HIGH_BIT, &high.to_string(), &expected));
     }
     let signed = match whole(tags::PIXEL_REPRESENTATION)? {
@@ -179,7 +181,6 @@ fn pixel_format(data: &DataSet) -> Result<PixelFormat, VolumeFileError> {
     let mut format = PixelFormat {
         bytes: allocated as usize / 8,
         bits_stored: stored as u32,
-        shift: (high + 1 - stored) as u32,
         signed,
         slope,
         intercept,

@@ -139,32 +139,57 @@ fn check_line(
     spacing_mm: f64,
     folder: &Path,
 ) -> Result<(), VolumeFileError> {
-    let count = (slices.len() - 1) as f64;
     let first = slices[0].position;
-    let step = (slices[slices.len() - 1].position - first) / count;
     let allowed = max_off(spacing_mm);
-    let off = |k: usize, step: Vector| (slices[k].position - first - step * k as f64).norm();
-    let farthest = |step: Vector| {
-        (0..slices.len())
-            .max_by(|&a, &b| off(a, step).total_cmp(&off(b, step)))
-            .expect("two slices or more")
-    };
-    let upright = normal * spacing_mm;
-    if off(farthest(upright), upright) <= allowed {
-        return Ok(());
-    }
-    let k = farthest(step);
-    if off(k, step) > allowed {
-        let off_mm = off(k, step);
+    // Where equal spacing puts each slice, seen from where it is.
+    let off: Vec<Vector> = (0..slices.len())
+        .map(|k| slices[k].position - first - normal * (spacing_mm * k as f64))
+        .collect();
+    let beside: Vec<Vector> = off.iter().map(|v| v - normal * v.dot(normal)).collect();
+    if beside.iter().any(|v| v.norm() > allowed) {
+        let step = beside[slices.len() - 1] / (slices.len() - 1) as f64;
+        let linear = |(k, v): (usize, &Vector)| (v - step * k as f64).norm() <= allowed;
+        if beside.iter().enumerate().all(linear) {
+            let shift_mm = step.norm();
+            return Err(DicomProblem::Tilt {
+                shift_mm,
+                spacing_mm,
+                angle_deg: shift_mm.atan2(spacing_mm).to_degrees(),
+            }
+            .at(folder));
+        }
+        let (k, off_mm) = farthest_from_median(&beside);
         return Err(DicomProblem::Shifted { off_mm }.at(slices[k].path()));
     }
-    let shift_mm = (step - upright).norm();
-    Err(DicomProblem::Tilt {
-        shift_mm,
-        spacing_mm,
-        angle_deg: shift_mm.atan2(spacing_mm).to_degrees(),
+    if off.iter().all(|v| v.norm() <= allowed) {
+        return Ok(());
     }
-    .at(folder))
+    // Every gap is near the usual one, but they add up: the spacing changes slowly.
+    let gap = |k: usize| (slices[k].position - slices[k - 1].position).dot(normal);
+    let strangeness = |k: usize| (gap(k) - spacing_mm).abs();
+    let k = (1..slices.len())
+        .max_by(|&a, &b| strangeness(a).total_cmp(&strangeness(b)))
+        .expect("two slices or more");
+    Err(DicomProblem::Uneven {
+        before: slices[k - 1].path().into(),
+        gap_mm: gap(k),
+        spacing_mm,
+    }
+    .at(slices[k].path()))
+}
+
+/// The slice that lies farthest beside most others, and how far.
+fn farthest_from_median(beside: &[Vector]) -> (usize, f64) {
+    let median = Vector::from_fn(|axis, _| {
+        let mut values: Vec<f64> = beside.iter().map(|v| v[axis]).collect();
+        values.sort_by(f64::total_cmp);
+        values[(values.len() - 1) / 2]
+    });
+    let off = |k: usize| (beside[k] - median).norm();
+    let k = (0..beside.len())
+        .max_by(|&a, &b| off(a).total_cmp(&off(b)))
+        .expect("two slices or more");
+    (k, off(k))
 }
 
 fn max_off(spacing_mm: f64) -> f64 {

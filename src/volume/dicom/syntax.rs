@@ -40,7 +40,9 @@ impl Syntax {
                     .map_or("unknown", |syntax| syntax.name());
                 let lossy = matches!(
                     uid,
-                    uids::JPEG_BASELINE8_BIT | uids::JPEG_EXTENDED12_BIT | uids::JPEGLS_NEAR_LOSSLESS
+                    uids::JPEG_BASELINE8_BIT
+                        | uids::JPEG_EXTENDED12_BIT
+                        | uids::JPEGLS_NEAR_LOSSLESS
                 );
                 return Err(DicomProblem::TransferSyntax {
                     uid: uid.into(),
