@@ -1,60 +1,21 @@
 //! The attributes of one DICOM file, and where its pixels lie.
 
+use super::meta::{Meta, has_magic};
 use super::problem::DicomProblem;
 use super::syntax::Syntax;
+use super::walk::walk;
 use crate::volume::VolumeFileError;
-use dicom_core::header::{DataElementHeader, Header};
 use dicom_core::{DataDictionary, PrimitiveValue, Tag};
-use dicom_dictionary_std::{StandardDataDictionary, tags, uids};
-use dicom_parser::StatefulDecode;
-use dicom_parser::dataset::LazyDataToken;
-use dicom_parser::dataset::lazy_read::LazyDataSetReader;
+use dicom_dictionary_std::StandardDataDictionary;
 use flate2::read::DeflateDecoder;
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufReader, Cursor, ErrorKind, Read, Seek, SeekFrom};
+use std::io::{BufReader, Cursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-
-/// The attributes that are kept.
-const WANTED: [Tag; 27] = [
-    tags::SPECIFIC_CHARACTER_SET,
-    tags::IMAGE_TYPE,
-    tags::SOP_CLASS_UID,
-    tags::MODALITY,
-    tags::SERIES_DESCRIPTION,
-    tags::SERIES_INSTANCE_UID,
-    tags::IMAGE_POSITION_PATIENT,
-    tags::IMAGE_ORIENTATION_PATIENT,
-    tags::FRAME_OF_REFERENCE_UID,
-    tags::SAMPLES_PER_PIXEL,
-    tags::PHOTOMETRIC_INTERPRETATION,
-    tags::NUMBER_OF_FRAMES,
-    tags::ROWS,
-    tags::COLUMNS,
-    tags::PIXEL_SPACING,
-    tags::BITS_ALLOCATED,
-    tags::BITS_STORED,
-    tags::HIGH_BIT,
-    tags::PIXEL_REPRESENTATION,
-    tags::PIXEL_PADDING_VALUE,
-    tags::PIXEL_PADDING_RANGE_LIMIT,
-    tags::RESCALE_INTERCEPT,
-    tags::RESCALE_SLOPE,
-    tags::RESCALE_TYPE,
-    tags::LOSSY_IMAGE_COMPRESSION,
-    tags::MODALITY_LUT_SEQUENCE,
-    tags::PIXEL_DATA,
-];
-
-/// Longer than any value of the kept attributes, in bytes.
-const MAX_VALUE_BYTES: u64 = 1 << 16;
 
 /// More than any slice: what a deflated file may become in memory. Deflate shrinks to a thousandth,
 /// so a small file could claim a large memory.
 const MAX_INFLATED_BYTES: u64 = 1 << 28;
-
-/// Bytes before `DICM`.
-const PREAMBLE_BYTES: u64 = 128;
 
 /// What a data set is read from: a file, or what a deflated one became.
 pub(super) trait Source: Read + Seek {}
@@ -219,88 +180,6 @@ fn open_file(path: &Path) -> Result<BufReader<File>, VolumeFileError> {
         .map_err(|e| io(path, e))
 }
 
-/// Whether a file says that it is DICOM; then the next byte read is the first of its meta group.
-fn has_magic(file: &mut BufReader<File>) -> std::io::Result<bool> {
-    let mut start = Vec::new();
-    file.take(PREAMBLE_BYTES + 4).read_to_end(&mut start)?;
-    Ok(start.get(PREAMBLE_BYTES as usize..) == Some(b"DICM".as_slice()))
-}
-
-/// What the meta group says, always in explicit VR little endian.
-#[derive(Debug, Default)]
-struct Meta {
-    sop_class: String,
-    transfer_syntax: String,
-}
-
-impl Meta {
-    /// Reads the group from its first byte, or from the file's, to its end. Its length is not
-    /// relied upon: some writers leave it out or wrong.
-    fn read(file: &mut BufReader<File>) -> Result<Self, DicomProblem> {
-        let broken = |e: std::io::Error| match e.kind() {
-            ErrorKind::UnexpectedEof => {
-                DicomProblem::Structure("it ends inside its meta group (0002,xxxx)".into())
-            }
-            _ => DicomProblem::Structure(e.to_string()),
-        };
-        file.seek(SeekFrom::Start(PREAMBLE_BYTES + 4))
-            .map_err(broken)?;
-        let mut meta = Self::default();
-        loop {
-            let mut start = [0; 8];
-            file.read_exact(&mut start).map_err(broken)?;
-            let [g0, g1, e0, e1, v0, v1, l0, l1] = start;
-            if u16::from_le_bytes([g0, g1]) != 0x0002 {
-                file.seek_relative(-8).map_err(broken)?;
-                return Ok(meta);
-            }
-            let length = match [v0, v1].as_slice() {
-                b"OB" | b"OW" | b"UN" | b"UT" => {
-                    let mut long = [0; 4];
-                    file.read_exact(&mut long).map_err(broken)?;
-                    u32::from_le_bytes(long)
-                }
-                _ => u16::from_le_bytes([l0, l1]).into(),
-            };
-            let field = match u16::from_le_bytes([e0, e1]) {
-                0x0002 => &mut meta.sop_class,
-                0x0010 => &mut meta.transfer_syntax,
-                _ => {
-                    file.seek_relative(length.into()).map_err(broken)?;
-                    continue;
-                }
-            };
-            let mut uid = Vec::new();
-            file.take(length.min(64).into())
-                .read_to_end(&mut uid)
-                .map_err(broken)?;
-            file.seek_relative(i64::from(length) - uid.len() as i64)
-                .map_err(broken)?;
-            let uid = String::from_utf8_lossy(&uid);
-            *field = uid.trim_end_matches(['\0', ' ']).to_owned();
-        }
-    }
-
-    fn syntax(&self) -> Result<Syntax, DicomProblem> {
-        if self.transfer_syntax.is_empty() {
-            return Err(DicomProblem::Missing {
-                attribute: attribute(tags::TRANSFER_SYNTAX_UID),
-                advice: "its encoding would be a guess: export it again",
-            });
-        }
-        Syntax::of(&self.transfer_syntax)
-    }
-
-    /// A DICOMDIR.
-    fn is_directory(&self) -> bool {
-        self.sop_class == uids::MEDIA_STORAGE_DIRECTORY_STORAGE
-    }
-
-    fn is_ct(&self, values: &BTreeMap<Tag, PrimitiveValue>) -> bool {
-        self.sop_class == uids::CT_IMAGE_STORAGE || values.contains_key(&tags::ROWS)
-    }
-}
-
 /// What the data set is read from, at its first byte, and its length in bytes.
 fn after_meta(
     mut file: BufReader<File>,
@@ -322,114 +201,4 @@ fn after_meta(
     }
     let bytes = inflated.len() as u64;
     Ok((Box::new(Cursor::new(inflated)), bytes))
-}
-
-struct Walked {
-    values: BTreeMap<Tag, PrimitiveValue>,
-    pixels: Option<PixelData>,
-}
-
-/// Goes through a data set up to its pixels.
-fn walk(source: &mut Box<dyn Source>, syntax: Syntax, bytes: u64) -> Result<Walked, DicomProblem> {
-    let mut values = BTreeMap::new();
-    if !starts_as(source, syntax)? {
-        return Ok(Walked {
-            values,
-            pixels: None,
-        });
-    }
-    let broken = |what: &dyn std::fmt::Display| DicomProblem::Structure(what.to_string());
-    let mut reader =
-        LazyDataSetReader::new_with_ts(source, &syntax.of_data_set()).map_err(|e| broken(&e))?;
-    // Items and sequences that are open: the parser panics on an end too many.
-    let mut depth = 0_usize;
-    let mut last = tags::SPECIFIC_CHARACTER_SET;
-    let pixels = loop {
-        let Some(token) = reader.advance() else {
-            if depth > 0 {
-                return Err(broken(&format!("it ends inside a sequence after {last}")));
-            }
-            break None;
-        };
-        match token.map_err(|e| broken(&format!("after {last}: {e}")))? {
-            LazyDataToken::PixelSequenceStart if depth == 0 => break Some(None),
-            LazyDataToken::ElementHeader(header) => {
-                last = header.tag;
-                if depth == 0 && last == tags::PIXEL_DATA {
-                    break Some(header.len.get());
-                }
-            }
-            LazyDataToken::SequenceStart { tag, .. } => {
-                if depth == 0 && WANTED.contains(&tag) {
-                    values.insert(tag, PrimitiveValue::Empty);
-                }
-                last = tag;
-                depth += 1;
-            }
-            LazyDataToken::ItemStart { .. } | LazyDataToken::PixelSequenceStart => depth += 1,
-            LazyDataToken::ItemEnd | LazyDataToken::SequenceEnd => {
-                depth = depth
-                    .checked_sub(1)
-                    .ok_or_else(|| broken(&format!("a sequence ends twice after {last}")))?;
-            }
-            LazyDataToken::LazyValue { header, decoder } => {
-                let left = bytes.saturating_sub(decoder.position());
-                let length = check_length(&header, left)?;
-                let wanted = depth == 0 && WANTED.contains(&header.tag);
-                if !wanted {
-                    decoder.skip_bytes(length).map_err(|e| broken(&e))?;
-                    continue;
-                }
-                if u64::from(length) > MAX_VALUE_BYTES {
-                    let name = attribute(header.tag);
-                    return Err(broken(&format!("{name} claims {length} bytes")));
-                }
-                let value = decoder
-                    .read_value_preserved(&header)
-                    .map_err(|e| broken(&format!("{}: {e}", attribute(header.tag))))?;
-                values.insert(header.tag, value);
-            }
-            LazyDataToken::LazyItemValue { len, decoder } => {
-                let left = bytes.saturating_sub(decoder.position());
-                if u64::from(len) > left {
-                    return Err(broken(&format!(
-                        "an item after {last} claims {len} bytes where {left} are left"
-                    )));
-                }
-                decoder.skip_bytes(len).map_err(|e| broken(&e))?;
-            }
-            _ => return Err(broken(&format!("after {last}: a token of no known kind"))),
-        }
-    };
-    let offset = reader.into_decoder().position();
-    let pixels = pixels.map(|length| PixelData {
-        offset,
-        length: length.map(u64::from),
-    });
-    Ok(Walked { values, pixels })
-}
-
-/// Looks at the first element; false where there is none.
-fn starts_as(source: &mut Box<dyn Source>, syntax: Syntax) -> Result<bool, DicomProblem> {
-    let broken = |e: std::io::Error| DicomProblem::Structure(e.to_string());
-    let at = source.stream_position().map_err(broken)?;
-    let mut start = Vec::new();
-    source.take(6).read_to_end(&mut start).map_err(broken)?;
-    source.seek(SeekFrom::Start(at)).map_err(broken)?;
-    let Ok(start) = <[u8; 6]>::try_from(start) else {
-        return Ok(false);
-    };
-    syntax.check_start(start).map(|()| true)
-}
-
-fn check_length(header: &DataElementHeader, left: u64) -> Result<u32, DicomProblem> {
-    let claims = match header.len.get() {
-        Some(length) if u64::from(length) <= left => return Ok(length),
-        Some(length) => format!("{length} bytes where {left} are left"),
-        None => "no length".into(),
-    };
-    Err(DicomProblem::Structure(format!(
-        "{} claims {claims}",
-        attribute(header.tag())
-    )))
 }
