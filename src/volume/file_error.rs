@@ -1,5 +1,6 @@
 //! What can be wrong with a file that holds a volume.
 
+use super::dicom::DicomProblem;
 use super::voxel::VoxelProblem;
 use std::path::PathBuf;
 
@@ -50,6 +51,12 @@ pub enum VolumeFileError {
         voxel: [usize; 3],
         value: f64,
         problem: VoxelProblem,
+    },
+    #[error("{path} {problem}")]
+    Dicom {
+        /// The file, or the folder of the series.
+        path: PathBuf,
+        problem: Box<DicomProblem>,
     },
     #[error("cannot write {path}: {reason}")]
     Unwritable { path: PathBuf, reason: String },

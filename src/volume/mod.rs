@@ -2,6 +2,7 @@
 
 pub mod components;
 pub mod cubic;
+pub mod dicom;
 pub mod distance;
 mod file_error;
 #[cfg(test)]
@@ -23,6 +24,7 @@ mod surface_nets;
 pub mod surface_query;
 mod voxel;
 
+pub use self::dicom::{read_dicom_series, read_dicom_series_of};
 pub use self::metaimage::read_metaimage;
 pub use self::nifti::{read_nifti, write_nifti};
 pub use self::nrrd::{nrrd_segment_names, read_nrrd};

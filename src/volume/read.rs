@@ -1,5 +1,6 @@
 //! One way in for every format.
 
+use super::dicom::read_dicom_series;
 use super::metaimage::{is_metaimage, read_metaimage};
 use super::nifti::{is_nifti, read_nifti};
 use super::nrrd::read_nrrd;
@@ -11,7 +12,7 @@ use std::path::Path;
 const START_BYTES: u64 = 1024;
 
 /// What is read, for messages.
-const READ: &str = "NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd)";
+const READ: &str = "NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd), a folder of a DICOM series";
 
 /// The formats of single files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +41,7 @@ pub fn read_volume<T: Voxel>(path: &Path) -> Result<Volume<T>, VolumeFileError> 
         Some(Format::Nifti) => read_nifti(path),
         Some(Format::Nrrd) => read_nrrd(path),
         Some(Format::MetaImage) => read_metaimage(path),
-        Some(Format::Dicom) => read_series(path.parent().unwrap_or(Path::new("."))),
+        Some(Format::Dicom) => read_series(path),
         None => Err(VolumeFileError::Format {
             path: path.into(),
             format: "volume file",
@@ -49,13 +50,22 @@ pub fn read_volume<T: Voxel>(path: &Path) -> Result<Volume<T>, VolumeFileError> 
     }
 }
 
-/// Reads the one DICOM series of a folder.
-fn read_series<T: Voxel>(folder: &Path) -> Result<Volume<T>, VolumeFileError> {
-    Err(VolumeFileError::Format {
-        path: folder.into(),
-        format: "volume file",
-        reason: format!("it is a folder; expected a file: {READ}"),
-    })
+/// Reads the one DICOM series of a folder, or the series that a file of it belongs to.
+fn read_series<T: Voxel>(path: &Path) -> Result<Volume<T>, VolumeFileError> {
+    let ct = read_dicom_series(path)?;
+    let mut data = Vec::with_capacity(ct.data.len());
+    for (offset, &hu) in ct.data.iter().enumerate() {
+        let value = f64::from(hu);
+        data.push(
+            T::from_file_value(value).map_err(|problem| VolumeFileError::Value {
+                path: path.into(),
+                voxel: ct.grid.voxel(offset),
+                value,
+                problem,
+            })?,
+        );
+    }
+    Ok(Volume::new(ct.grid, data))
 }
 
 fn by_content(start: &[u8]) -> Option<Format> {
