@@ -1,7 +1,7 @@
 //! The built binary on specimens: what it makes, shows, proves and refuses.
 
 use assert_cmd::Command;
-use pao_sim::anatomy::surfaces::BONE_FILES;
+use pao_sim::anatomy::surfaces::BONES;
 use pao_sim::anatomy::{PhantomParameters, Specimen, phantom, read_specimen, write_specimen};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -68,8 +68,8 @@ fn cuboid(mm: f64, open: usize) -> String {
 /// A folder of boxes instead of bones.
 fn boxes(mm: f64) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
-    for file in BONE_FILES {
-        std::fs::write(folder.path().join(file), cuboid(mm, 0)).unwrap();
+    for bone in BONES {
+        std::fs::write(folder.path().join(format!("{bone}.ply")), cuboid(mm, 0)).unwrap();
     }
     folder
 }
@@ -223,10 +223,7 @@ fn open_surfaces_missing_ones_and_wrong_units_are_named() {
     std::fs::remove_file(at("Sacrum.ply")).unwrap();
     std::fs::remove_file(at("Femur_L.ply")).unwrap();
     let message = refused_import(surfaces.path());
-    assert!(
-        message.contains("lacks Sacrum.ply, Femur_L.ply"),
-        "{message}"
-    );
+    assert!(message.contains("lacks Sacrum, Femur_L;"), "{message}");
 
     let message = refused_import(boxes(0.2).path());
     assert!(message.contains("Sacrum.ply is 0.200 mm long"), "{message}");
