@@ -1,6 +1,7 @@
 //! The built binary on specimens: what it makes, shows, proves and refuses.
 
 use assert_cmd::Command;
+use pao_sim::anatomy::landmark_files::read_landmark_overrides;
 use pao_sim::anatomy::surfaces::BONES;
 use pao_sim::anatomy::{PhantomParameters, Specimen, phantom, read_specimen, write_specimen};
 use std::path::{Path, PathBuf};
@@ -134,6 +135,26 @@ fn a_sound_body_is_proved_and_drawn() {
             "{picture}"
         );
     }
+}
+
+#[test]
+fn landmarks_go_to_slicer_and_come_back() {
+    let (folder, path) = written();
+    let landmarks = |file: &str, code: i32| {
+        let out = folder.path().join(file);
+        let mut command = pao_sim();
+        command.args(["specimen", "landmarks"]).arg(&path);
+        (said(command.arg("--out").arg(&out), code), out)
+    };
+    let ((line, _), file) = landmarks("body.mrk.json", 0);
+    assert!(line.contains("16 landmarks and both rims"), "{line}");
+    let back = read_landmark_overrides(&file).unwrap();
+    assert_eq!(back.landmarks, BODY.landmarks);
+    assert_eq!(back.rims, BODY.rims.clone().map(Some));
+    let ((_, errors), _) = landmarks("body.mrk.json", 1);
+    assert!(errors.contains("exists already"), "{errors}");
+    let ((_, errors), _) = landmarks("body.fcsv", 2);
+    assert!(errors.contains(".mrk.json"), "{errors}");
 }
 
 #[test]

@@ -127,7 +127,7 @@ fn an_inward_surface_is_turned_inside_out_and_an_open_one_refused() {
     let surface = read("bone.obj", inward.as_bytes(), PatientFrame::Ras).unwrap();
     assert_eq!(triangles(&surface), expected());
     let end = text.trim_end().rfind('\n').unwrap();
-    let message = refused("bone.obj", text[..end].as_bytes());
+    let message = refused("bone.obj", &text.as_bytes()[..end]);
     assert!(message.contains("not closed: 3 edges"), "{message}");
 }
 
