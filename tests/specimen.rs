@@ -1,7 +1,8 @@
 //! The built binary on specimens: what it makes, shows, proves and refuses.
 
 use assert_cmd::Command;
-use pao_sim::anatomy::surfaces::BONE_FILES;
+use pao_sim::anatomy::landmark_files::read_landmark_overrides;
+use pao_sim::anatomy::surfaces::BONES;
 use pao_sim::anatomy::{PhantomParameters, Specimen, phantom, read_specimen, write_specimen};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -68,8 +69,8 @@ fn cuboid(mm: f64, open: usize) -> String {
 /// A folder of boxes instead of bones.
 fn boxes(mm: f64) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
-    for file in BONE_FILES {
-        std::fs::write(folder.path().join(file), cuboid(mm, 0)).unwrap();
+    for bone in BONES {
+        std::fs::write(folder.path().join(format!("{bone}.ply")), cuboid(mm, 0)).unwrap();
     }
     folder
 }
@@ -134,6 +135,26 @@ fn a_sound_body_is_proved_and_drawn() {
             "{picture}"
         );
     }
+}
+
+#[test]
+fn landmarks_go_to_slicer_and_come_back() {
+    let (folder, path) = written();
+    let landmarks = |file: &str, code: i32| {
+        let out = folder.path().join(file);
+        let mut command = pao_sim();
+        command.args(["specimen", "landmarks"]).arg(&path);
+        (said(command.arg("--out").arg(&out), code), out)
+    };
+    let ((line, _), file) = landmarks("body.mrk.json", 0);
+    assert!(line.contains("16 landmarks and both rims"), "{line}");
+    let back = read_landmark_overrides(&file).unwrap();
+    assert_eq!(back.landmarks, BODY.landmarks);
+    assert_eq!(back.rims, BODY.rims.clone().map(Some));
+    let ((_, errors), _) = landmarks("body.mrk.json", 1);
+    assert!(errors.contains("exists already"), "{errors}");
+    let ((_, errors), _) = landmarks("body.fcsv", 2);
+    assert!(errors.contains(".mrk.json"), "{errors}");
 }
 
 #[test]
@@ -223,10 +244,7 @@ fn open_surfaces_missing_ones_and_wrong_units_are_named() {
     std::fs::remove_file(at("Sacrum.ply")).unwrap();
     std::fs::remove_file(at("Femur_L.ply")).unwrap();
     let message = refused_import(surfaces.path());
-    assert!(
-        message.contains("lacks Sacrum.ply, Femur_L.ply"),
-        "{message}"
-    );
+    assert!(message.contains("lacks Sacrum, Femur_L;"), "{message}");
 
     let message = refused_import(boxes(0.2).path());
     assert!(message.contains("Sacrum.ply is 0.200 mm long"), "{message}");

@@ -37,6 +37,8 @@ pub enum Failure {
     #[error(transparent)]
     Import(#[from] pao_sim::anatomy::surfaces::ImportError),
     #[error(transparent)]
+    Points(#[from] pao_sim::anatomy::landmark_files::PointsFileError),
+    #[error(transparent)]
     Slurm(#[from] SlurmError),
     #[error("{phase}: {message}", phase = .0.phase, message = .0.message)]
     Work(pao_sim::study::Failure),

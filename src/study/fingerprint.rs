@@ -6,7 +6,7 @@
 use super::config::{PopulationSection, SpecimenSource};
 use super::folder::{StudyError, io};
 use crate::anatomy::disk::SPECIMEN_FILES;
-use crate::anatomy::surfaces::{BONE_FILES, ORIGIN_FILE};
+use crate::anatomy::surfaces::{ORIGIN_FILE, bone_files};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::Path;
@@ -24,7 +24,14 @@ pub fn fingerprints(
         let fingerprint = match &source {
             SpecimenSource::Phantom(_) => continue,
             SpecimenSource::Folder(dir) => of_files(dir, &SPECIMEN_FILES, &[])?,
-            SpecimenSource::Surfaces(dir) => of_files(dir, &BONE_FILES, &[ORIGIN_FILE])?,
+            SpecimenSource::Surfaces(dir) => {
+                let files = bone_files(dir)?;
+                let names = files.each_ref().map(|file| {
+                    let name = file.file_name().and_then(|name| name.to_str());
+                    name.expect("files of bones have names of plain letters")
+                });
+                of_files(dir, &names, &[ORIGIN_FILE])?
+            }
         };
         found.insert(source.name(), fingerprint);
     }
@@ -50,14 +57,15 @@ fn of_files(dir: &Path, needed: &[&str], optional: &[&str]) -> Result<String, St
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::anatomy::surfaces::BONES;
 
     #[test]
     fn every_file_counts_and_none_may_miss() {
         let folder = tempfile::tempdir().unwrap();
         let dir = folder.path().join("z1");
         std::fs::create_dir(&dir).unwrap();
-        for (n, name) in BONE_FILES.iter().enumerate() {
-            std::fs::write(dir.join(name), [n as u8]).unwrap();
+        for (n, name) in BONES.iter().enumerate() {
+            std::fs::write(dir.join(format!("{name}.ply")), [n as u8]).unwrap();
         }
         let population = PopulationSection {
             surfaces: vec![dir.clone()],
@@ -69,9 +77,12 @@ mod tests {
         std::fs::write(dir.join(ORIGIN_FILE), "sex = \"male\"").unwrap();
         let second = of().unwrap();
         assert_ne!(first, second);
-        std::fs::write(dir.join(BONE_FILES[3]), "other").unwrap();
-        assert_ne!(of().unwrap(), second);
-        std::fs::remove_file(dir.join(BONE_FILES[3])).unwrap();
-        assert!(of().unwrap_err().to_string().contains(BONE_FILES[3]));
+        std::fs::write(dir.join("Femur_L.ply"), "other").unwrap();
+        let third = of().unwrap();
+        assert_ne!(third, second);
+        std::fs::rename(dir.join("Femur_L.ply"), dir.join("Femur_L.stl")).unwrap();
+        assert_ne!(of().unwrap(), third);
+        std::fs::remove_file(dir.join("Femur_L.stl")).unwrap();
+        assert!(of().unwrap_err().to_string().contains("Femur_L"));
     }
 }

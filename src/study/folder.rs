@@ -102,6 +102,8 @@ pub enum StudyError {
         keys: Vec<String>,
     },
     #[error(transparent)]
+    Surfaces(#[from] crate::anatomy::surfaces::ImportError),
+    #[error(transparent)]
     Simd(#[from] crate::simd::SimdError),
     #[error("cannot set up the study: {0}")]
     Worker(String),

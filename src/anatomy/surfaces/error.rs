@@ -7,15 +7,35 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImportError {
-    #[error("{dir} lacks {}; expected a closed surface for each bone", .missing.join(", "))]
-    MissingFiles { dir: PathBuf, missing: Vec<String> },
+    #[error(
+        "{dir} lacks {}; expected a closed surface for each bone, as .ply, .stl, .vtk or .obj{}",
+        .missing.join(", "), also(.unread)
+    )]
+    MissingFiles {
+        dir: PathBuf,
+        /// Names without an ending.
+        missing: Vec<String>,
+        /// Files of these names in formats that are not read.
+        unread: Vec<String>,
+    },
+    #[error("{dir} holds {}: which one is the bone? Keep one of them", .files.join(" and "))]
+    Ambiguous { dir: PathBuf, files: Vec<String> },
     #[error("cannot read {path}: {source}")]
     Io {
         path: PathBuf,
         source: std::io::Error,
     },
-    #[error("{path} is not a readable PLY surface: {reason}")]
-    Ply { path: PathBuf, reason: String },
+    #[error("{path} is not a readable {format} surface: {reason}")]
+    Format {
+        path: PathBuf,
+        /// What it was read as, `PLY` for instance.
+        format: &'static str,
+        reason: String,
+    },
+    #[error(
+        "{0} is of no format that is read; expected .ply, .stl, .vtk (legacy polydata) or .obj: save it as one of them"
+    )]
+    UnknownFormat(PathBuf),
     #[error(
         "{path} is not closed: {open_edges} edges have a triangle on one side only or are run through twice the same way; close the surface's holes"
     )]
@@ -30,11 +50,21 @@ pub enum ImportError {
         high: f64,
     },
     #[error(
-        "{path} does not say where the surfaces come from: {reason}; expected the keys sex, licence and from, each a text"
+        "{path} does not say where the surfaces come from: {reason}; expected the keys sex, licence and from, each a text, and frame, RAS or LPS"
     )]
     Origin { path: PathBuf, reason: String },
     #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
     Several(Vec<ImportError>),
     #[error("cannot find the landmarks: {0}")]
     Detect(#[from] DetectError),
+}
+
+fn also(unread: &[String]) -> String {
+    match unread {
+        [] => String::new(),
+        files => format!(
+            " ({} is not read: save it as one of them)",
+            files.join(", ")
+        ),
+    }
 }

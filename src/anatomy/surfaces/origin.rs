@@ -1,11 +1,12 @@
 //! What people know about a specimen and surfaces do not say.
 
 use super::error::ImportError;
+use crate::anatomy::PatientFrame;
 use serde::Deserialize;
 use std::path::Path;
 
 /// The file in a folder of bone surfaces that says whose they are. It may be missing, as may each
-/// of its keys: `sex`, `licence`, `from`.
+/// of its keys: `sex`, `licence`, `from` and `frame`.
 pub const ORIGIN_FILE: &str = "surfaces.toml";
 
 /// What people know about a specimen and surfaces do not say.
@@ -27,6 +28,34 @@ struct Entries {
     sex: Option<String>,
     licence: Option<String>,
     from: Option<String>,
+    frame: Option<PatientFrame>,
+}
+
+impl Entries {
+    /// What the folder's file says; nothing if there is none.
+    fn of_folder(dir: &Path) -> Result<Self, ImportError> {
+        let path = dir.join(ORIGIN_FILE);
+        if !path.exists() {
+            return Ok(Self::default());
+        }
+        let text = std::fs::read_to_string(&path).map_err(|source| ImportError::Io {
+            path: path.clone(),
+            source,
+        })?;
+        toml::from_str(&text).map_err(|e| ImportError::Origin {
+            path,
+            reason: e.to_string(),
+        })
+    }
+}
+
+/// The frame of those of a folder's surfaces that state none themselves: what [`ORIGIN_FILE`] says,
+/// and RAS where it says nothing.
+///
+/// # Errors
+/// When the file is there and cannot be read.
+pub(super) fn unstated_frame(dir: &Path) -> Result<PatientFrame, ImportError> {
+    Ok(Entries::of_folder(dir)?.frame.unwrap_or(PatientFrame::Ras))
 }
 
 impl SurfacesOrigin {
@@ -36,18 +65,7 @@ impl SurfacesOrigin {
     /// # Errors
     /// When the file is there and cannot be read.
     pub fn of_folder(dir: &Path, name: &str) -> Result<Self, ImportError> {
-        let path = dir.join(ORIGIN_FILE);
-        let entries = if path.exists() {
-            let text = std::fs::read_to_string(&path).map_err(|source| ImportError::Io {
-                path: path.clone(),
-                source,
-            })?;
-            let bad = |reason| ImportError::Origin { path, reason };
-            let entries: Entries = toml::from_str(&text).map_err(|e| bad(e.to_string()))?;
-            entries
-        } else {
-            Entries::default()
-        };
+        let entries = Entries::of_folder(dir)?;
         Ok(Self {
             name: name.to_owned(),
             sex: entries.sex.unwrap_or_else(|| "unknown".into()),
@@ -74,6 +92,12 @@ mod tests {
             (&*origin.licence, &*origin.from),
             ("not stated", "a scanner")
         );
+        assert_eq!(unstated_frame(folder.path()).unwrap(), PatientFrame::Ras);
+        std::fs::write(&file, "frame = \"LPS\"\n").unwrap();
+        assert_eq!(unstated_frame(folder.path()).unwrap(), PatientFrame::Lps);
+        std::fs::write(&file, "frame = \"LAS\"\n").unwrap();
+        let message = unstated_frame(folder.path()).unwrap_err().to_string();
+        assert!(message.contains("frame, RAS or LPS"), "{message}");
         std::fs::write(&file, "sexx = \"female\"\n").unwrap();
         let message = read().unwrap_err().to_string();
         assert!(

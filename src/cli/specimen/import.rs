@@ -12,14 +12,14 @@ use std::path::{Path, PathBuf};
 
 #[derive(Debug, Subcommand)]
 pub enum From {
-    /// From closed surfaces of the bones (PLY, RAS, mm): Sacrum.ply, Hip_L.ply, Hip_R.ply,
-    /// Femur_L.ply and Femur_R.ply. Landmarks and rims are found by rule, densities assigned.
+    /// From closed surfaces of the bones (.ply, .stl, .vtk or .obj; mm): Sacrum, Hip_L, Hip_R, Femur_L
+    /// and Femur_R. Landmarks and rims are found by rule, densities assigned.
     Surfaces(Surfaces),
 }
 
 #[derive(Debug, clap::Args)]
 pub struct Surfaces {
-    /// Folder of the surfaces; its surfaces.toml, if it has one, says sex, licence and origin
+    /// Folder of the surfaces; its surfaces.toml, if it has one, says sex, licence, origin and frame
     dir: PathBuf,
     /// The specimen's folder; it must not be there yet
     #[arg(long, value_name = "FOLDER")]

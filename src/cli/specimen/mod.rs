@@ -2,6 +2,7 @@
 
 mod check;
 mod import;
+mod landmarks;
 mod show;
 mod source;
 
@@ -23,6 +24,8 @@ enum Command {
     Import(import::From),
     /// Draw a specimen: radiograph, landmarks, rims, planned cuts and fragments.
     Show(show::Arguments),
+    /// Write a specimen's landmarks and rims for 3D Slicer, to be corrected there.
+    Landmarks(landmarks::Arguments),
     /// Prove on a specimen's own data that its sides, frames and units are right.
     Check(check::Arguments),
 }
@@ -31,6 +34,7 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     match &arguments.command {
         Command::Import(from) => import::main(from, common),
         Command::Show(own) => show::main(own, common),
+        Command::Landmarks(own) => landmarks::main(own, common),
         Command::Check(own) => check::main(own, common),
     }
 }
