@@ -12,6 +12,7 @@ pub mod phantom;
 pub mod problem;
 pub mod side;
 pub mod specimen;
+pub mod structure;
 pub mod surfaces;
 
 pub use disk::{SpecimenError, read_specimen, write_specimen};
@@ -20,7 +21,8 @@ pub use label::Label;
 pub use landmark::{Landmark, Landmarks};
 pub use lce::{LceApex, lce_angle};
 pub use mirror::mirror;
-pub use phantom::{PhantomParameters, phantom};
+pub use phantom::{PhantomParameters, phantom, phantom_structures};
 pub use problem::{SpecimenProblem, specimen_problems};
 pub use side::Side;
 pub use specimen::{Source, Specimen};
+pub use structure::{Structure, StructureLabels};

@@ -8,6 +8,7 @@ pub mod grid;
 pub mod morphology;
 pub mod nifti;
 mod place;
+pub mod resample;
 mod samples;
 pub mod surface;
 #[cfg(test)]

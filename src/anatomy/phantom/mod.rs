@@ -17,4 +17,4 @@ mod voxelize;
 mod wing;
 
 pub use parameters::PhantomParameters;
-pub use voxelize::phantom;
+pub use voxelize::{phantom, phantom_structures};

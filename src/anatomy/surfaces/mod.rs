@@ -17,6 +17,6 @@ mod voxelize;
 
 pub use bone_files::{BONE_FILES, read_bone_surfaces};
 pub use error::ImportError;
-pub use import::specimen_from_surfaces;
+pub use import::{specimen_from_surfaces, structures_from_surfaces};
 pub use origin::{ORIGIN_FILE, SurfacesOrigin};
 pub use parameters::SurfacesParameters;
