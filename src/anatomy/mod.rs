@@ -4,6 +4,7 @@ pub mod check;
 pub mod detect;
 pub mod disk;
 pub mod frame;
+pub mod import;
 pub mod label;
 pub mod landmark;
 pub mod lce;

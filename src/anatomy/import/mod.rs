@@ -1,0 +1,19 @@
+//! Specimens from a CT and a segmentation of it.
+//!
+//! Each kind of data is read by a file of its own to a CT and [`StructureLabels`](super::StructureLabels);
+//! [`specimen_from_ct`] makes a specimen of them, the same way for all.
+
+mod bone_surfaces;
+mod clean;
+mod error;
+mod grid;
+mod note;
+mod origin;
+mod parameters;
+mod specimen;
+
+pub use error::CtImportError;
+pub use note::Note;
+pub use origin::CtOrigin;
+pub use parameters::CtImportParameters;
+pub use specimen::{CtImport, Imported, specimen_from_ct};
