@@ -23,19 +23,23 @@ const MAX_STEPS: usize = 16;
 pub fn resample_intensities(source: &Volume<i16>, target: &Grid) -> Volume<i16> {
     let steps = Steps::new(&source.grid, target);
     let share = 1.0 / steps.offsets.len() as f64;
-    collect(target, |index| {
-        let mut sum = 0.0;
-        for offset in &steps.offsets {
-            sum += match Corners::new(&source.grid, &(index + offset)) {
-                Some(corners) => corners
-                    .iter()
-                    .map(|(at, weight)| f64::from(source.data[at]) * weight)
-                    .sum(),
-                None => f64::from(AIR_HU),
-            };
-        }
-        (sum * share).round() as i16
-    }, &steps)
+    collect(
+        target,
+        |index| {
+            let mut sum = 0.0;
+            for offset in &steps.offsets {
+                sum += match Corners::new(&source.grid, &(index + offset)) {
+                    Some(corners) => corners
+                        .iter()
+                        .map(|(at, weight)| f64::from(source.data[at]) * weight)
+                        .sum(),
+                    None => f64::from(AIR_HU),
+                };
+            }
+            (sum * share).round() as i16
+        },
+        &steps,
+    )
 }
 
 /// Labels on another grid. Each label's share of the target voxel is interpolated as an intensity
@@ -43,20 +47,24 @@ pub fn resample_intensities(source: &Volume<i16>, target: &Grid) -> Volume<i16> 
 /// comes out that was not there; 0 outside.
 pub fn resample_labels(source: &Volume<u8>, target: &Grid) -> Volume<u8> {
     let steps = Steps::new(&source.grid, target);
-    collect(target, |index| {
-        let mut votes = Votes::default();
-        for offset in &steps.offsets {
-            match Corners::new(&source.grid, &(index + offset)) {
-                Some(corners) => {
-                    for (at, weight) in corners.iter() {
-                        votes.add(source.data[at], weight);
+    collect(
+        target,
+        |index| {
+            let mut votes = Votes::default();
+            for offset in &steps.offsets {
+                match Corners::new(&source.grid, &(index + offset)) {
+                    Some(corners) => {
+                        for (at, weight) in corners.iter() {
+                            votes.add(source.data[at], weight);
+                        }
                     }
+                    None => votes.add(0, 1.0),
                 }
-                None => votes.add(0, 1.0),
             }
-        }
-        votes.winner()
-    }, &steps)
+            votes.winner()
+        },
+        &steps,
+    )
 }
 
 /// Fills the target slice by slice; `value` gets the source's continuous index of a centre.
@@ -67,11 +75,13 @@ fn collect<T: Copy + Default + Send + Sync>(
 ) -> Volume<T> {
     let [ni, nj, _] = target.dims;
     let mut data = vec![T::default(); target.len()];
-    data.par_chunks_mut((ni * nj).max(1)).enumerate().for_each(|(k, slice)| {
-        for (n, out) in slice.iter_mut().enumerate() {
-            *out = value(steps.index(n % ni, n / ni, k));
-        }
-    });
+    data.par_chunks_mut((ni * nj).max(1))
+        .enumerate()
+        .for_each(|(k, slice)| {
+            for (n, out) in slice.iter_mut().enumerate() {
+                *out = value(steps.index(n % ni, n / ni, k));
+            }
+        });
     Volume::new(target.clone(), data)
 }
 
@@ -267,12 +277,18 @@ mod tests {
         let far = Grid::axis_aligned([2, 2, 2], 1.0, Point::new(900.0, 0.0, 0.0));
         assert_eq!(resample_intensities(&source, &far).data, [AIR_HU; 8]);
         // The outermost voxels reach half a voxel beyond their centres, and no farther.
-        let line = Volume::new(Grid::axis_aligned([2, 2, 2], 2.0, Point::origin()), vec![7i16; 8]);
+        let line = Volume::new(
+            Grid::axis_aligned([2, 2, 2], 2.0, Point::origin()),
+            vec![7i16; 8],
+        );
         let beside = |x: f64| {
             let one = Grid::axis_aligned([1, 1, 1], 1.0, Point::new(x, 0.0, 0.0));
             resample_intensities(&line, &one).data[0]
         };
-        assert_eq!([beside(-0.9), beside(-1.1), beside(2.9), beside(3.1)], [7, AIR_HU, 7, AIR_HU]);
+        assert_eq!(
+            [beside(-0.9), beside(-1.1), beside(2.9), beside(3.1)],
+            [7, AIR_HU, 7, AIR_HU]
+        );
     }
 
     #[test]
@@ -291,13 +307,19 @@ mod tests {
     #[test]
     fn labels_meet_halfway_and_none_is_invented() {
         // 1 below, 7 above: an average of values would pass through 2 to 6.
-        let coarse = Grid { spacing: [1.0, 1.0, 3.0], ..Grid::axis_aligned([3, 3, 4], 1.0, Point::origin()) };
+        let coarse = Grid {
+            spacing: [1.0, 1.0, 3.0],
+            ..Grid::axis_aligned([3, 3, 4], 1.0, Point::origin())
+        };
         let data = (0..coarse.len()).map(|o| if coarse.voxel(o)[2] < 2 { 1 } else { 7 });
         let labels = Volume::new(coarse.clone(), data.collect());
         let target = Grid::axis_aligned([1, 1, 9], 1.0, Point::new(1.0, 1.0, 0.5));
         // The border lies at z = 4.5, midway between the centres at 3 and 6: exactly there the
         // lower label wins.
-        assert_eq!(resample_labels(&labels, &target).data, [1, 1, 1, 1, 1, 7, 7, 7, 7]);
+        assert_eq!(
+            resample_labels(&labels, &target).data,
+            [1, 1, 1, 1, 1, 7, 7, 7, 7]
+        );
         assert_eq!(resample_labels(&labels, &coarse), labels);
     }
 
@@ -317,7 +339,10 @@ mod tests {
 
     #[test]
     fn a_ball_keeps_its_place_from_thick_slices() {
-        let grid = Grid { spacing: [0.8, 0.8, 3.0], ..oblique([70, 70, 20], [1.0; 3]) };
+        let grid = Grid {
+            spacing: [0.8, 0.8, 3.0],
+            ..oblique([70, 70, 20], [1.0; 3])
+        };
         let center = grid.point(34.3, 35.1, 9.4);
         let data = (0..grid.len())
             .map(|o| u8::from((grid.center(grid.voxel(o)) - center).norm() < 20.0) * 4);

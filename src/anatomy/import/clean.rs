@@ -68,10 +68,7 @@ fn enclosed(mask: &Volume<bool>) -> Volume<bool> {
         let [i, j, k] = mask.grid.voxel(offset);
         found.labels.at(i + 1, j + 1, k + 1) > 1
     };
-    Volume::new(
-        mask.grid.clone(),
-        (0..mask.grid.len()).map(hole).collect(),
-    )
+    Volume::new(mask.grid.clone(), (0..mask.grid.len()).map(hole).collect())
 }
 
 #[cfg(test)]
@@ -89,7 +86,8 @@ mod tests {
         // nowhere, and a loose piece outside.
         for offset in 0..map.data.len() {
             let v = grid.voxel(offset);
-            let shell = v.iter().all(|&n| (2..=6).contains(&n)) && v.iter().any(|&n| n == 2 || n == 6);
+            let shell =
+                v.iter().all(|&n| (2..=6).contains(&n)) && v.iter().any(|&n| n == 2 || n == 6);
             if shell {
                 map.data[offset] = hip.value();
             }
@@ -106,8 +104,15 @@ mod tests {
         assert_eq!(
             notes,
             [
-                Note::Dropped { structure: hip, voxels: 2, pieces: 1 },
-                Note::Filled { structure: hip, voxels: 26 }
+                Note::Dropped {
+                    structure: hip,
+                    voxels: 2,
+                    pieces: 1
+                },
+                Note::Filled {
+                    structure: hip,
+                    voxels: 26
+                }
             ]
         );
         // A hole that is open to one side is none.

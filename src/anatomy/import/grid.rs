@@ -61,7 +61,11 @@ impl Lattice {
                 let strides = [1, ct.grid.dims[0], ct.grid.dims[0] * ct.grid.dims[1]];
                 let at = |axis: usize, n: usize| {
                     let n = n + min[axis];
-                    let own = if flipped[axis] { grid.dims[axis] - 1 - n } else { n };
+                    let own = if flipped[axis] {
+                        grid.dims[axis] - 1 - n
+                    } else {
+                        n
+                    };
                     own * strides[axes[axis]]
                 };
                 let mut data = Vec::with_capacity(part.len());
@@ -102,11 +106,14 @@ fn kept(ct: &Grid, voxel_mm: f64) -> Option<Lattice> {
     };
     // The farthest corners would show any other spacing or direction most.
     let lies = |corner: usize| {
-        let on_grid: [usize; 3] =
-            std::array::from_fn(|a| (corner >> a & 1) * (grid.dims[a] - 1));
+        let on_grid: [usize; 3] = std::array::from_fn(|a| (corner >> a & 1) * (grid.dims[a] - 1));
         let mut own = [0; 3];
         for a in 0..3 {
-            own[axes[a]] = if flipped[a] { grid.dims[a] - 1 - on_grid[a] } else { on_grid[a] };
+            own[axes[a]] = if flipped[a] {
+                grid.dims[a] - 1 - on_grid[a]
+            } else {
+                on_grid[a]
+            };
         }
         (grid.center(on_grid) - ct.center(own)).norm() < SAME_VOXELS * voxel_mm
     };
@@ -166,7 +173,10 @@ pub(super) fn around_bones(
 ///
 /// # Errors
 /// When most of a hip bone or the sacrum lies outside the CT.
-pub(super) fn check_overlap(ct: &Grid, labels: &StructureLabels) -> Result<Vec<Note>, CtImportError> {
+pub(super) fn check_overlap(
+    ct: &Grid,
+    labels: &StructureLabels,
+) -> Result<Vec<Note>, CtImportError> {
     let own = &labels.volume().grid;
     if same_grid(ct, own) {
         return Ok(Vec::new());
@@ -211,7 +221,12 @@ pub(super) fn check_overlap(ct: &Grid, labels: &StructureLabels) -> Result<Vec<N
 pub(super) fn span(grid: &Grid) -> String {
     let (low, high) = centers(grid);
     let axis = |name: &str, a: usize| format!("{name} {:.0} to {:.0}", low[a], high[a]);
-    format!("LPS {}, {}, {} mm", axis("x", 0), axis("y", 1), axis("z", 2))
+    format!(
+        "LPS {}, {}, {} mm",
+        axis("x", 0),
+        axis("y", 1),
+        axis("z", 2)
+    )
 }
 
 #[cfg(test)]
@@ -260,7 +275,8 @@ mod tests {
         fine.spacing[1] = 0.98;
         assert!(matches!(Lattice::of(&fine, 1.0), Lattice::New { .. }));
         let mut tilted = turned().grid;
-        tilted.direction = nalgebra::Rotation3::from_euler_angles(0.0, 0.0, 0.02) * tilted.direction;
+        tilted.direction =
+            nalgebra::Rotation3::from_euler_angles(0.0, 0.0, 0.02) * tilted.direction;
         let lattice = Lattice::of(&tilted, 1.0);
         assert!(matches!(lattice, Lattice::New { .. }));
         assert_eq!(lattice.grid().spacing, [1.0; 3]);
@@ -278,10 +294,16 @@ mod tests {
             let grid = Grid::axis_aligned([10, 10, 10], 1.0, Point::new(x, 2.0, 2.0));
             StructureLabels::new(Volume::filled(grid, Structure::Hip(Side::Left).value()))
         };
-        assert_eq!(check_overlap(&ct, &at(4.0)).unwrap(), [Note::LabelsResampled]);
+        assert_eq!(
+            check_overlap(&ct, &at(4.0)).unwrap(),
+            [Note::LabelsResampled]
+        );
         assert_eq!(check_overlap(&ct, &at(14.0)).unwrap().len(), 2);
         let message = check_overlap(&ct, &at(16.0)).unwrap_err().to_string();
-        assert!(message.contains("only 40 % of the left hip bone"), "{message}");
+        assert!(
+            message.contains("only 40 % of the left hip bone"),
+            "{message}"
+        );
         assert!(message.contains("x 16 to 25"), "{message}");
     }
 }

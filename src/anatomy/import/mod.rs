@@ -7,12 +7,19 @@ mod bone_surfaces;
 mod clean;
 mod error;
 mod grid;
+pub mod labels;
+mod masks;
+mod names;
 mod note;
 mod origin;
 mod parameters;
 mod specimen;
+#[cfg(test)]
+mod tests;
+pub mod totalseg;
 
 pub use error::CtImportError;
+pub use names::LabelMeaning;
 pub use note::Note;
 pub use origin::CtOrigin;
 pub use parameters::CtImportParameters;

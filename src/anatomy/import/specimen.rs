@@ -61,12 +61,12 @@ pub fn specimen_from_ct(
     if !(0.4..=3.0).contains(&voxel_mm) {
         return Err(CtImportError::VoxelSize(voxel_mm));
     }
-    let absent = import.structures.absent();
-    if !absent.is_empty() {
-        return Err(CtImportError::Absent(absent));
-    }
+    check_present(&import.structures)?;
     check_sides(&import.structures)?;
     let mut notes = import.notes;
+    if import.structures.absent().contains(&Structure::Sacrum) {
+        notes.push(Note::NoSacrum);
+    }
     notes.extend(check_overlap(&import.ct.grid, &import.structures)?);
     let (structures, cleaned) = clean(&import.structures);
     notes.extend(cleaned);
@@ -86,10 +86,7 @@ pub fn specimen_from_ct(
     let (min, max) = around_bones(&structures, lattice.grid(), SURFACE_MARGIN_MM);
     let near = lattice.grid().cropped(min, max);
     let bones = StructureLabels::new(resample_labels(structures.volume(), &near));
-    let absent = bones.absent();
-    if !absent.is_empty() {
-        return Err(CtImportError::Absent(absent));
-    }
+    check_present(&bones)?;
     let surfaces = bones.surfaces(&parameters.surface);
     let marks = marks(&surfaces, &import.landmarks, &import.rims, &mut notes)?;
 
@@ -106,6 +103,16 @@ pub fn specimen_from_ct(
         rims: marks.rims,
     };
     Ok(Imported { specimen, notes })
+}
+
+/// Landmarks are sought on hip bones and femora.
+fn check_present(structures: &StructureLabels) -> Result<(), CtImportError> {
+    let mut absent = structures.absent();
+    absent.retain(|&s| s != Structure::Sacrum);
+    match absent.is_empty() {
+        true => Ok(()),
+        false => Err(CtImportError::Absent(absent)),
+    }
 }
 
 /// Left bones lie on the patient's left.
@@ -126,8 +133,16 @@ fn check_sides(structures: &StructureLabels) -> Result<(), CtImportError> {
         grid.point(mean.x, mean.y, mean.z).x
     };
     for (what, left, right) in [
-        ("hip bone", Structure::Hip(Side::Left), Structure::Hip(Side::Right)),
-        ("femur", Structure::Femur(Side::Left), Structure::Femur(Side::Right)),
+        (
+            "hip bone",
+            Structure::Hip(Side::Left),
+            Structure::Hip(Side::Right),
+        ),
+        (
+            "femur",
+            Structure::Femur(Side::Left),
+            Structure::Femur(Side::Right),
+        ),
     ] {
         let apart_mm = x(right) - x(left);
         if apart_mm >= 0.0 {

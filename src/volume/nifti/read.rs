@@ -12,7 +12,7 @@ use std::path::Path;
 const FORMAT: &str = "NIfTI-1 file (.nii or .nii.gz)";
 
 /// Bytes of a NIfTI-1 header; a single file's voxels start after it and 4 more.
-const HEADER_BYTES: u64 = 348;
+pub(super) const HEADER_BYTES: u64 = 348;
 
 /// Reads the volume of a `.nii` or `.nii.gz` file, of any integer or float datatype, with the
 /// header's scaling applied. Its world is LPS in mm; oblique and mirrored axes are kept as they
@@ -40,7 +40,7 @@ pub fn read_nifti<T: Voxel>(path: &Path) -> Result<Volume<T>, VolumeFileError> {
 }
 
 /// The file's bytes, decompressed where it starts as gzip does, whatever its name.
-fn open(path: &Path) -> Result<Box<dyn Read>, VolumeFileError> {
+pub(super) fn open(path: &Path) -> Result<Box<dyn Read>, VolumeFileError> {
     let io = |source| VolumeFileError::Io {
         doing: "read",
         path: path.into(),
@@ -58,7 +58,10 @@ fn open(path: &Path) -> Result<Box<dyn Read>, VolumeFileError> {
     })
 }
 
-fn read_header(stream: &mut dyn Read, path: &Path) -> Result<NiftiHeader, VolumeFileError> {
+pub(super) fn read_header(
+    stream: &mut dyn Read,
+    path: &Path,
+) -> Result<NiftiHeader, VolumeFileError> {
     let not_nifti = |reason: String| VolumeFileError::Format {
         path: path.into(),
         format: FORMAT,
