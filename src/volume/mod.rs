@@ -22,6 +22,7 @@ mod voxel;
 pub use self::nifti::{read_nifti, write_nifti};
 pub use file_error::VolumeFileError;
 pub use grid::{Grid, Volume};
+pub(crate) use place::grid_from_affine;
 pub use read::read_volume;
 pub use surface::{Surface, SurfaceParameters};
 pub use surface_query::Hit;

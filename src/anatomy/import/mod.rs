@@ -5,6 +5,7 @@
 
 mod bone_surfaces;
 mod clean;
+pub mod deepfluoro;
 mod error;
 mod grid;
 pub mod labels;
