@@ -18,6 +18,7 @@ mod specimen;
 #[cfg(test)]
 mod tests;
 pub mod totalseg;
+pub mod vsd;
 
 pub use error::CtImportError;
 pub use names::LabelMeaning;

@@ -4,7 +4,9 @@ use super::labels::{LabelTable, read_label_table, structures_of_labels};
 use super::totalseg::{TotalsegVersion, read_totalseg};
 use super::*;
 use crate::anatomy::phantom::{PhantomParameters, phantom_structures};
-use crate::anatomy::{Landmarks, Side, Specimen, Structure, StructureLabels, specimen_problems};
+use crate::anatomy::{
+    Landmark, Landmarks, Side, Specimen, Structure, StructureLabels, specimen_problems,
+};
 use crate::geometry::Vector;
 use crate::volume::{Grid, Volume, read_volume, write_nifti};
 use std::path::Path;
@@ -90,7 +92,7 @@ fn what_is_on_the_grid_passes_bit_for_bit() {
     assert!(!DIRECT.source.assigned_density);
     // Given points replace those found by rule; the others stay.
     let mut import = import(body.ct.clone(), BODY.1.clone(), vec![]);
-    let left = crate::anatomy::Landmark::Asis;
+    let left = Landmark::Asis;
     let point = body.landmarks.get(left, Side::Left).unwrap();
     import.landmarks.set(left, Side::Left, point);
     import.rims[1] = Some(body.rims[1].clone());
@@ -117,10 +119,7 @@ fn without_detection_everything_must_be_given() {
     let (body, structures) = &*BODY;
     let mut flat = structures.volume().clone();
     // The heads are cut off: no sphere.
-    let head = body
-        .landmarks
-        .get(crate::anatomy::Landmark::Fh, Side::Left)
-        .unwrap();
+    let head = body.landmarks.get(Landmark::Fh, Side::Left).unwrap();
     for (offset, value) in flat.data.iter_mut().enumerate() {
         let p = structures
             .volume()
@@ -241,6 +240,140 @@ fn label_maps_with_tables_give_the_same() {
     assert_same(&made(body.ct.clone(), read, notes).specimen, &DIRECT);
 }
 
+/// As Slicer saves it: uncropped, and uncompressed so that it can be written here by hand.
+fn seg_nrrd(structures: &StructureLabels) -> Vec<u8> {
+    let Grid { dims, origin, .. } = structures.volume().grid;
+    let mut header = format!(
+        "NRRD0004\ntype: unsigned char\ndimension: 3\nspace: right-anterior-superior\n\
+         sizes: {} {} {}\nspace directions: (-{VOXEL_MM},0,0) (0,-{VOXEL_MM},0) (0,0,{VOXEL_MM})\n\
+         kinds: domain domain domain\nencoding: raw\nspace origin: ({},{},{})\n",
+        dims[0], dims[1], dims[2], -origin.x, -origin.y, origin.z
+    );
+    for (n, name) in ["Sacrum", "Hip_L", "Hip_R", "Femur_L", "Femur_R"]
+        .iter()
+        .enumerate()
+    {
+        header += &format!(
+            "Segment{n}_Name:={name}\nSegment{n}_LabelValue:={}\n",
+            n + 1
+        );
+    }
+    let mut bytes = (header + "\n").into_bytes();
+    bytes.extend(&structures.volume().data);
+    bytes
+}
+
+#[test]
+fn a_subject_of_vsd_gives_the_same() {
+    let (body, structures) = &*BODY;
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    write_nifti(&body.ct, &file("a.nii.gz")).unwrap();
+    std::fs::write(file("a_Reconstruction.seg.nrrd"), seg_nrrd(structures)).unwrap();
+    let read = vsd::read_vsd(&vsd::find_vsd(folder.path()).unwrap()).unwrap();
+    assert_eq!(&read.structures, structures);
+    assert_same(
+        &made(read.ct, read.structures, read.notes).specimen,
+        &DIRECT,
+    );
+}
+
+#[test]
+fn a_deepfluoro_file_gives_the_same_with_its_own_landmarks() {
+    use hdf5_pure::FileBuilder;
+    let (body, structures) = &*BODY;
+    let grid = &body.ct.grid;
+    let mut builder = FileBuilder::new();
+    let mut specimen = builder.create_group("17-1882");
+    let shape = [
+        grid.dims[2] as u64,
+        grid.dims[1] as u64,
+        grid.dims[0] as u64,
+    ];
+    let place = |group: &mut hdf5_pure::GroupBuilder| {
+        group
+            .create_dataset("spacing")
+            .with_f64_data(&grid.spacing)
+            .with_shape(&[3, 1]);
+        let origin: [f64; 3] = grid.origin.coords.into();
+        group
+            .create_dataset("origin")
+            .with_f64_data(&origin)
+            .with_shape(&[3, 1]);
+        let unit = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+        group
+            .create_dataset("dir-mat")
+            .with_f64_data(&unit)
+            .with_shape(&[3, 3]);
+    };
+    let mut vol = specimen.create_group("vol");
+    vol.create_dataset("pixels")
+        .with_i16_data(&body.ct.data)
+        .with_shape(&shape);
+    place(&mut vol);
+    specimen.add_group(vol.finish());
+    let mut seg = specimen.create_group("vol-seg");
+    let mut image = seg.create_group("image");
+    let map = structures
+        .volume()
+        .map(|v| [0u8, 4, 1, 2, 5, 6][usize::from(v)]);
+    image
+        .create_dataset("pixels")
+        .with_u8_data(&map.data)
+        .with_shape(&shape);
+    place(&mut image);
+    seg.add_group(image.finish());
+    specimen.add_group(seg.finish());
+    let mut points = specimen.create_group("vol-landmarks");
+    for (landmark, side, p) in body.landmarks.iter() {
+        if landmark != Landmark::Aiis {
+            let name = landmark.key(side).replace('_', "-");
+            let p: [f64; 3] = p.coords.into();
+            points
+                .create_dataset(&name)
+                .with_f64_data(&p)
+                .with_shape(&[3, 1]);
+        }
+    }
+    specimen.add_group(points.finish());
+    builder.add_group(specimen.finish());
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("data.h5");
+    builder.write(&path).unwrap();
+
+    let read = deepfluoro::read_deepfluoro(&path, None).unwrap();
+    assert_eq!(&read.structures, structures);
+    let mut import = import(read.ct, read.structures, read.notes);
+    import.landmarks = read.landmarks;
+    let found = specimen_from_ct(import, &parameters()).unwrap().specimen;
+    let mut expected = DIRECT.clone();
+    for (landmark, side, p) in body.landmarks.iter() {
+        if landmark != Landmark::Aiis {
+            expected.landmarks.set(landmark, side, p);
+        }
+    }
+    assert_same(&found, &expected);
+}
+
+/// The specimen's own bones as closed surfaces, through the other importer.
+#[test]
+fn through_surfaces_labels_and_landmarks_stay() {
+    use crate::anatomy::surfaces::structures_from_surfaces;
+    let structures = &BODY.1;
+    let surfaces = structures.surfaces(&parameters().surface);
+    let found = crate::anatomy::detect::detect(&surfaces).unwrap();
+    for (landmark, side, point) in DIRECT.landmarks.iter() {
+        let apart = (point - found.landmarks.get(landmark, side).unwrap()).norm();
+        assert!(apart < 0.5, "{landmark:?} {side}: {apart} mm");
+    }
+    let back = structures_from_surfaces(&surfaces, &DIRECT.labels.grid).labels();
+    for label in 1..=3 {
+        let dice = dice(&back, &DIRECT.labels, label);
+        println!("label {label}: Dice {dice:.4}");
+        assert!(dice > 0.97, "label {label}: {dice}");
+    }
+}
+
 #[test]
 fn joined_bones_are_told_apart_or_refused() {
     let structures = &BODY.1;
@@ -351,7 +484,7 @@ fn other_grids_are_resampled_in_place() {
     }
     for (landmark, side, point) in specimen.landmarks.iter() {
         let apart = (point - DIRECT.landmarks.get(landmark, side).unwrap()).norm();
-        if landmark == crate::anatomy::Landmark::Fh {
+        if landmark == Landmark::Fh {
             assert!(apart < 0.3, "{landmark:?} {side}: {apart} mm");
         }
         assert!(apart < 8.0, "{landmark:?} {side}: {apart} mm");
@@ -381,13 +514,7 @@ fn a_tall_ct_is_cropped_to_what_a_study_needs() {
     }
     let found = made(ct, StructureLabels::new(map), vec![]).specimen;
     let z = |k: usize| found.ct.grid.center([0, 0, k]).z;
-    let lower = Side::BOTH.map(|s| {
-        found
-            .landmarks
-            .get(crate::anatomy::Landmark::Fh, s)
-            .unwrap()
-            .z
-    });
+    let lower = Side::BOTH.map(|s| found.landmarks.get(Landmark::Fh, s).unwrap().z);
     let below = lower[0].min(lower[1]) - z(0);
     assert!((150.0..=155.0).contains(&below), "{below}");
     assert!(found.ct.grid.dims[2] < tall.dims[2] - 50);

@@ -46,10 +46,9 @@ pub fn read_deepfluoro(path: &Path, id: Option<&str>) -> Result<DeepFluoro, CtIm
     let id = match (id, ids.as_slice()) {
         (Some(id), _) if ids.iter().any(|name| name == id) => id.to_owned(),
         (Some(id), _) => {
-            return Err(source.problem(format!(
-                "has no specimen '{id}'; it holds {}",
-                listed(&ids)
-            )));
+            return Err(
+                source.problem(format!("has no specimen '{id}'; it holds {}", listed(&ids)))
+            );
         }
         (None, [one]) => one.clone(),
         (None, _) => {

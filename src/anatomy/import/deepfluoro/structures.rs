@@ -42,10 +42,7 @@ pub(super) fn read_structures(
         absent if absent.is_empty() => Ok((structures, notes)),
         absent => {
             let names: Vec<&str> = absent.into_iter().map(Structure::name).collect();
-            Err(source.problem(format!(
-                "vol-seg has no voxel of {}",
-                names.join(", ")
-            )))
+            Err(source.problem(format!("vol-seg has no voxel of {}", names.join(", "))))
         }
     }
 }

@@ -17,7 +17,10 @@ fn every_voxel_and_point_is_where_h5py_put_it() {
     let first = read_deepfluoro(&fixture(), Some("17-1882")).unwrap();
     assert_eq!(first.ct.grid.dims, [3, 4, 5]);
     assert_eq!(first.ct.at(2, 1, 4), 100 * 4 + 10 + 2 - 200);
-    assert_eq!(first.ct.grid.center([2, 1, 4]), Point::new(-8.5, 21.25, -896.0));
+    assert_eq!(
+        first.ct.grid.center([2, 1, 4]),
+        Point::new(-8.5, 21.25, -896.0)
+    );
     let map = first.structures.volume();
     assert_eq!(map.grid, first.ct.grid);
     for offset in 0..60 {
@@ -37,9 +40,15 @@ fn every_voxel_and_point_is_where_h5py_put_it() {
     assert_eq!(second.structures.volume().data, map.data);
     assert_eq!(second.ct.grid.spacing, [0.5, 0.75, 2.0]);
     let at = second.ct.grid.center([2, 3, 4]);
-    assert!((at - Point::new(1.0 - 3.0 * 0.75, 2.0 + 2.0 * 0.5, 3.0 + 8.0)).norm() < 1e-12, "{at}");
+    assert!(
+        (at - Point::new(1.0 - 3.0 * 0.75, 2.0 + 2.0 * 0.5, 3.0 + 8.0)).norm() < 1e-12,
+        "{at}"
+    );
     assert_eq!(second.ct.grid.direction.column(0), Vector::y());
-    assert_eq!(second.structures.count(Structure::Sacrum), first.structures.count(Structure::Sacrum));
+    assert_eq!(
+        second.structures.count(Structure::Sacrum),
+        first.structures.count(Structure::Sacrum)
+    );
 }
 
 #[test]
@@ -47,7 +56,11 @@ fn a_specimen_must_be_named_and_there() {
     let message = |id| read_deepfluoro(&fixture(), id).unwrap_err().to_string();
     assert!(message(None).contains("holds 17-1882, 18-1109; say which"));
     assert!(message(Some("17")).contains("no specimen '17'; it holds 17-1882"));
-    let message = |id| read_deepfluoro(std::path::Path::new(id), None).unwrap_err().to_string();
+    let message = |id| {
+        read_deepfluoro(std::path::Path::new(id), None)
+            .unwrap_err()
+            .to_string()
+    };
     assert!(message("no/such.h5").contains("no/such.h5"));
     let source = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");
     assert!(message(source).contains("not a readable HDF5 file"));
