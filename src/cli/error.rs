@@ -37,6 +37,10 @@ pub enum Failure {
     #[error(transparent)]
     Import(#[from] pao_sim::anatomy::surfaces::ImportError),
     #[error(transparent)]
+    CtImport(#[from] pao_sim::anatomy::import::CtImportError),
+    #[error(transparent)]
+    Volume(#[from] pao_sim::volume::VolumeFileError),
+    #[error(transparent)]
     Slurm(#[from] SlurmError),
     #[error("{phase}: {message}", phase = .0.phase, message = .0.message)]
     Work(pao_sim::study::Failure),
