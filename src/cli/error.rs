@@ -39,6 +39,10 @@ pub enum Failure {
     #[error(transparent)]
     Points(#[from] pao_sim::anatomy::landmark_files::PointsFileError),
     #[error(transparent)]
+    CtImport(#[from] pao_sim::anatomy::import::CtImportError),
+    #[error(transparent)]
+    Volume(#[from] pao_sim::volume::VolumeFileError),
+    #[error(transparent)]
     Slurm(#[from] SlurmError),
     #[error("{phase}: {message}", phase = .0.phase, message = .0.message)]
     Work(pao_sim::study::Failure),

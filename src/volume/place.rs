@@ -23,7 +23,7 @@ pub(super) fn check_finite(affine: &Matrix3x4<f64>) -> Result<(), String> {
 ///
 /// # Errors
 /// With what is wrong with the affine: not finite, without extent, or its axes not at right angles.
-pub(super) fn grid_from_affine(
+pub(crate) fn grid_from_affine(
     lps_from_index: &Matrix3x4<f64>,
     dims: [usize; 3],
 ) -> Result<Grid, String> {

@@ -19,4 +19,4 @@ mod wing;
 
 pub use parameters::PhantomParameters;
 pub use source::phantom_source;
-pub use voxelize::phantom;
+pub use voxelize::{phantom, phantom_structures};

@@ -7,7 +7,7 @@ use super::noise::Noise;
 use super::skeleton::{Bone, Skeleton, sided};
 use super::soft_tissue::SoftTissue;
 use super::source::phantom_source;
-use crate::anatomy::{Label, Landmark, Landmarks, Side, Specimen};
+use crate::anatomy::{Landmark, Landmarks, Side, Specimen, Structure, StructureLabels};
 use crate::geometry::Point;
 use crate::random::{Purpose, stream};
 use crate::volume::{Grid, Volume};
@@ -28,6 +28,15 @@ const NOISE_SD: f64 = 0.37;
 ///
 /// It is a pure function of `number` and `parameters`; the number of threads changes nothing.
 pub fn phantom(number: u32, parameters: &PhantomParameters) -> Specimen {
+    phantom_structures(number, parameters).0
+}
+
+/// The same body, with the map of its bones before sacrum and hip bones become one label: what a
+/// segmentation of its CT would be.
+pub fn phantom_structures(
+    number: u32,
+    parameters: &PhantomParameters,
+) -> (Specimen, StructureLabels) {
     let skeleton = Skeleton::draw(number, parameters);
     let name = format!("phantom-{number}");
     let mut texture = stream(parameters.seed, Purpose::PhantomTexture, &name);
@@ -36,20 +45,22 @@ pub fn phantom(number: u32, parameters: &PhantomParameters) -> Specimen {
     let noise = Noise::new(&mut texture);
     let landmarks = landmarks(&skeleton);
     let grid = grid(&skeleton, &soft, parameters.voxel_mm);
-    let (ct, labels) = fill(&grid, &skeleton, &soft, &bone, &noise, parameters);
+    let (ct, structures) = fill(&grid, &skeleton, &soft, &bone, &noise, parameters);
     let world = skeleton.build.world_from_pelvis;
     let rims = Side::BOTH.map(|side| {
         let rim = skeleton.hips[side.index()].rim();
         rim.iter().map(|p| world * sided(p, side)).collect()
     });
-    Specimen {
+    let structures = StructureLabels::new(Volume::new(grid.clone(), structures));
+    let specimen = Specimen {
         name,
         source: phantom_source(number, parameters),
-        ct: Volume::new(grid.clone(), ct),
-        labels: Volume::new(grid, labels),
+        ct: Volume::new(grid, ct),
+        labels: structures.labels(),
         landmarks,
         rims,
-    }
+    };
+    (specimen, structures)
 }
 
 fn landmarks(skeleton: &Skeleton) -> Landmarks {
@@ -101,7 +112,7 @@ fn fill(
 ) -> (Vec<i16>, Vec<u8>) {
     let slice = grid.dims[0] * grid.dims[1];
     let mut ct = vec![0i16; grid.len()];
-    let mut labels = vec![0u8; grid.len()];
+    let mut structures = vec![0u8; grid.len()];
     let pelvis_from_world = skeleton.build.world_from_pelvis.inverse();
     let blur = BLUR_MM.max(0.5 * parameters.voxel_mm);
     let femur_end = Side::BOTH.map(|side| {
@@ -109,9 +120,9 @@ fn fill(
         (skeleton.build.world_from_pelvis * head).z - FEMUR_END_MM
     });
     ct.par_chunks_mut(slice)
-        .zip(labels.par_chunks_mut(slice))
+        .zip(structures.par_chunks_mut(slice))
         .enumerate()
-        .for_each(|(k, (ct, labels))| {
+        .for_each(|(k, (ct, structures))| {
             for j in 0..grid.dims[1] {
                 for i in 0..grid.dims[0] {
                     let world = grid.center([i, j, k]);
@@ -145,16 +156,17 @@ fn fill(
                     let hu = hu + noise.at(&world, 1.7) * (parameters.noise_hu / NOISE_SD);
                     ct[j * grid.dims[0] + i] = hu.round().clamp(-1024.0, 3071.0) as i16;
                     if d <= 0.0 {
-                        labels[j * grid.dims[0] + i] = match which {
-                            Bone::Hip(_) | Bone::Sacrum => Label::Pelvis.value(),
+                        structures[j * grid.dims[0] + i] = match which {
+                            Bone::Hip(side) => Structure::Hip(side).value(),
+                            Bone::Sacrum => Structure::Sacrum.value(),
                             Bone::Femur(side) if world.z >= femur_end[side.index()] => {
-                                Label::femur(side).value()
+                                Structure::Femur(side).value()
                             }
-                            Bone::Femur(_) | Bone::Spine => Label::Background.value(),
+                            Bone::Femur(_) | Bone::Spine => 0,
                         };
                     }
                 }
             }
         });
-    (ct, labels)
+    (ct, structures)
 }

@@ -10,7 +10,7 @@ use super::parameters::SurfacesParameters;
 use super::soft_tissue::soft_tissue;
 use super::voxelize::for_each_inside;
 use crate::anatomy::detect::{BoneSurfaces, Detected, detect};
-use crate::anatomy::{Label, Side, Source, Specimen};
+use crate::anatomy::{Label, Side, Source, Specimen, Structure, StructureLabels};
 use crate::geometry::{Point, Vector};
 use crate::random::{Purpose, Stream, stream};
 use crate::volume::distance::squared_distance;
@@ -33,18 +33,10 @@ const SHAFT_MM: (f64, f64) = (55.0, 110.0);
 /// its depth, voxels are counted (mm).
 const NEAR_MM: f64 = 4.0;
 
-/// A bone of the import: its surface, its label, and what it is made of.
+/// A bone of the import: its surface and which it is.
 struct Bone<'a> {
     surface: &'a Surface,
-    label: Label,
-    kind: Kind,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Sacrum,
-    Hip(Side),
-    Femur(Side),
+    kind: Structure,
 }
 
 /// Makes a specimen from bone surfaces: voxels of [`SurfacesParameters::voxel_mm`] from
@@ -67,21 +59,11 @@ pub fn specimen_from_surfaces(
     let heads = found.heads.map(|h| h.center);
     let body = Body::around(bones, heads, parameters);
     let grid = grid(bones, &body, heads, parameters);
-    let list = [
-        Bone::new(&bones.hips[0], Label::Pelvis, Kind::Hip(Side::Left)),
-        Bone::new(&bones.hips[1], Label::Pelvis, Kind::Hip(Side::Right)),
-        Bone::new(&bones.sacrum, Label::Pelvis, Kind::Sacrum),
-        Bone::new(&bones.femurs[0], Label::FemurLeft, Kind::Femur(Side::Left)),
-        Bone::new(
-            &bones.femurs[1],
-            Label::FemurRight,
-            Kind::Femur(Side::Right),
-        ),
-    ];
+    let list = bone_list(bones);
     let which = bone_numbers(&list, &grid);
     let labels = which.map(|n| match n {
         0 => Label::Background.value(),
-        n => list[usize::from(n) - 1].label.value(),
+        n => list[usize::from(n) - 1].kind.label().value(),
     });
     let mut stream = stream(parameters.seed, Purpose::AssignedDensity, &origin.name);
     let ct = assigned_ct(&list, &which, &body, &found, parameters, &mut stream);
@@ -96,12 +78,8 @@ pub fn specimen_from_surfaces(
 }
 
 impl<'a> Bone<'a> {
-    fn new(surface: &'a Surface, label: Label, kind: Kind) -> Self {
-        Self {
-            surface,
-            label,
-            kind,
-        }
+    fn new(surface: &'a Surface, kind: Structure) -> Self {
+        Self { surface, kind }
     }
 }
 
@@ -136,6 +114,27 @@ fn grid(bones: &BoneSurfaces, body: &Body, heads: [Point; 2], p: &SurfacesParame
     let (low, high) = (low - air, high + air);
     let dims = std::array::from_fn(|a| ((high[a] - low[a]) / p.voxel_mm).ceil() as usize + 1);
     Grid::axis_aligned(dims, p.voxel_mm, low)
+}
+
+/// The bones' voxels on an axis-aligned grid, as the import from surfaces labels them: a segmentation
+/// of these bones.
+pub fn structures_from_surfaces(bones: &BoneSurfaces, grid: &Grid) -> StructureLabels {
+    let list = bone_list(bones);
+    StructureLabels::new(bone_numbers(&list, grid).map(|n| match n {
+        0 => 0,
+        n => list[usize::from(n) - 1].kind.value(),
+    }))
+}
+
+/// The bones in the order in which they have voxels that several claim.
+fn bone_list(bones: &BoneSurfaces) -> [Bone<'_>; 5] {
+    [
+        Bone::new(&bones.hips[0], Structure::Hip(Side::Left)),
+        Bone::new(&bones.hips[1], Structure::Hip(Side::Right)),
+        Bone::new(&bones.sacrum, Structure::Sacrum),
+        Bone::new(&bones.femurs[0], Structure::Femur(Side::Left)),
+        Bone::new(&bones.femurs[1], Structure::Femur(Side::Right)),
+    ]
 }
 
 /// 1 + the number in `list` of the bone at each voxel, or 0. Bones that overlap, as segmented
@@ -234,8 +233,8 @@ impl Bone<'_> {
             inner_hu: (inner_hu + texture).max(p.fat_hu),
         };
         match self.kind {
-            Kind::Sacrum => spongy(p.cortical_mm * 2.0 / 3.0, p.trabecular_hu * 0.6),
-            Kind::Hip(side) => {
+            Structure::Sacrum => spongy(p.cortical_mm * 2.0 / 3.0, p.trabecular_hu * 0.6),
+            Structure::Hip(side) => {
                 // Bone carries the joint's load: its shell and sponge are denser there.
                 let head = &found.heads[side.index()];
                 let beyond = (at - head.center).norm() - head.radius_mm;
@@ -245,7 +244,7 @@ impl Bone<'_> {
                     p.trabecular_hu * (1.0 + 0.5 * joint),
                 )
             }
-            Kind::Femur(side) => {
+            Structure::Femur(side) => {
                 let head = &found.heads[side.index()];
                 let from_head = (at - head.center).norm() / head.radius_mm;
                 let in_head = 1.0 - smooth_step(0.8, 1.3, from_head);

@@ -4,10 +4,12 @@
 //! nowhere else.
 
 mod affine;
+mod extensions;
 mod read;
 mod voxel;
 mod write;
 
+pub use extensions::{NiftiExtension, read_nifti_extensions};
 pub(super) use read::is_nifti;
 pub use read::read_nifti;
 pub use voxel::NiftiVoxel;

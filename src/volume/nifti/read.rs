@@ -12,7 +12,7 @@ use std::path::Path;
 const FORMAT: &str = "NIfTI-1 file (.nii or .nii.gz)";
 
 /// Bytes of a NIfTI-1 header; a single file's voxels start after it and 4 more.
-const HEADER_BYTES: u64 = 348;
+pub(super) const HEADER_BYTES: u64 = 348;
 
 /// Reads the volume of a `.nii` or `.nii.gz` file, of any integer or float datatype, with the
 /// header's scaling applied. Its world is LPS in mm; oblique and mirrored axes are kept as they
@@ -57,7 +57,7 @@ pub(in crate::volume) fn is_nifti(start: &[u8]) -> bool {
 }
 
 /// The file's bytes, decompressed where it starts as gzip does, whatever its name.
-fn open(path: &Path) -> Result<Box<dyn Read>, VolumeFileError> {
+pub(super) fn open(path: &Path) -> Result<Box<dyn Read>, VolumeFileError> {
     let mut whole = source::open(path)?;
     Ok(if source::is_gzip(&mut whole, path)? {
         Box::new(MultiGzDecoder::new(whole))
@@ -66,7 +66,10 @@ fn open(path: &Path) -> Result<Box<dyn Read>, VolumeFileError> {
     })
 }
 
-fn read_header(stream: &mut dyn Read, path: &Path) -> Result<NiftiHeader, VolumeFileError> {
+pub(super) fn read_header(
+    stream: &mut dyn Read,
+    path: &Path,
+) -> Result<NiftiHeader, VolumeFileError> {
     let not_nifti = |reason: String| VolumeFileError::Format {
         path: path.into(),
         format: FORMAT,

@@ -1,24 +1,15 @@
-//! `pao-sim specimen import`: a specimen's folder from other data.
+//! From closed surfaces of the bones.
 
-use super::source::Bodies;
+use super::common::{check_free, folder_name, tell};
 use crate::cli::args::Common;
 use crate::cli::error::{Exit, Failure};
-use crate::cli::output::say;
-use clap::Subcommand;
+use crate::cli::specimen::source::Bodies;
 use pao_sim::anatomy::surfaces::{SurfacesOrigin, read_bone_surfaces, specimen_from_surfaces};
-use pao_sim::anatomy::{Specimen, SpecimenError, write_specimen};
-use serde_json::json;
-use std::path::{Path, PathBuf};
-
-#[derive(Debug, Subcommand)]
-pub enum From {
-    /// From closed surfaces of the bones (.ply, .stl, .vtk or .obj; mm): Sacrum, Hip_L, Hip_R, Femur_L
-    /// and Femur_R. Landmarks and rims are found by rule, densities assigned.
-    Surfaces(Surfaces),
-}
+use pao_sim::anatomy::{Specimen, write_specimen};
+use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
-pub struct Surfaces {
+pub struct Arguments {
     /// Folder of the surfaces; its surfaces.toml, if it has one, says sex, licence, origin and frame
     dir: PathBuf,
     /// The specimen's folder; it must not be there yet
@@ -41,19 +32,16 @@ pub struct Surfaces {
     bodies: Bodies,
 }
 
-pub fn main(from: &From, common: &Common) -> Result<Exit, Failure> {
-    let From::Surfaces(arguments) = from;
-    let specimen = of_surfaces(arguments)?;
+pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    // What takes a minute is not begun for a folder that cannot be written.
+    check_free(&arguments.out)?;
+    let specimen = specimen(arguments)?;
     write_specimen(&specimen, &arguments.out)?;
-    tell(&specimen, &arguments.out, common);
+    tell(&specimen, &arguments.out, &[], common);
     Ok(Exit::Complete)
 }
 
-fn of_surfaces(arguments: &Surfaces) -> Result<Specimen, Failure> {
-    // What takes a minute is not begun for a folder that cannot be written.
-    if arguments.out.exists() {
-        return Err(SpecimenError::Exists(arguments.out.clone()).into());
-    }
+fn specimen(arguments: &Arguments) -> Result<Specimen, Failure> {
     let population = arguments.bodies.population()?;
     let bones = read_bone_surfaces(&arguments.dir)?;
     let name = match &arguments.name {
@@ -75,28 +63,4 @@ fn of_surfaces(arguments: &Surfaces) -> Result<Specimen, Failure> {
         &origin,
         &population.surface_bodies,
     )?)
-}
-
-/// The name of a folder, also of `.` and `..`.
-fn folder_name(dir: &Path) -> String {
-    let whole = dir.canonicalize().unwrap_or_else(|_| dir.to_owned());
-    let name = whole.file_name().unwrap_or_default();
-    name.to_string_lossy().into_owned()
-}
-
-fn tell(specimen: &Specimen, folder: &Path, common: &Common) {
-    let [i, j, k] = specimen.ct.grid.dims;
-    let mm = specimen.ct.grid.spacing[0];
-    if common.json {
-        say!(
-            "{}",
-            json!({"specimen": specimen.name, "folder": folder, "dims": [i, j, k], "voxel_mm": mm})
-        );
-    } else {
-        say!(
-            "{}: specimen {}, {i} x {j} x {k} voxels of {mm} mm",
-            folder.display(),
-            specimen.name
-        );
-    }
 }

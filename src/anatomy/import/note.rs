@@ -1,0 +1,43 @@
+//! What an import met and a user should know.
+
+use crate::anatomy::Structure;
+
+/// Something that was done or found and that a user should know; nothing is wrong.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Note {
+    #[error("the CT's voxels of {0} were resampled to {1} mm along the world's axes")]
+    Resampled(String, f64),
+    #[error("the segmentation lies on another grid than the CT and was resampled to it")]
+    LabelsResampled,
+    #[error("{percent:.1} % of the {structure} lie outside the CT and are lost")]
+    Outside { structure: Structure, percent: f64 },
+    #[error(
+        "{voxels} voxels of the {structure} in {pieces} pieces beside the largest were dropped"
+    )]
+    Dropped {
+        structure: Structure,
+        voxels: usize,
+        pieces: usize,
+    },
+    #[error("no bone is the sacrum by itself: it is part of the hip bones, or images will lack it")]
+    NoSacrum,
+    #[error("{voxels} voxels enclosed by the {structure} were added to it")]
+    Filled { structure: Structure, voxels: usize },
+    #[error("{voxels} voxels belong to both {first} and {second}; the {first} has them")]
+    Overlap {
+        first: Structure,
+        second: Structure,
+        voxels: usize,
+    },
+    #[error(
+        "the {structure} ends {found_mm:.0} mm below its head; a study wants 150 mm, and its shaft will be missing in images that show more"
+    )]
+    ShortFemur { structure: Structure, found_mm: f64 },
+    #[error("not found by rule: {0}; what the landmark file says is taken")]
+    NotDetected(String),
+    #[error("taken from the landmark file: {0}")]
+    Overridden(String),
+    #[error("{0}")]
+    Reader(String),
+}
