@@ -10,7 +10,16 @@
 mod fuzzing;
 
 use fuzzing::{CountingAllocator, Reader, Seed, fuzz};
-use pao_sim::volume::{nrrd_segment_names, read_metaimage, read_nifti, read_nrrd, read_volume};
+use pao_sim::anatomy::PatientFrame;
+use pao_sim::anatomy::import::deepfluoro::read_deepfluoro;
+use pao_sim::anatomy::import::labels::read_label_table;
+use pao_sim::anatomy::import::vsd::read_segmentation;
+use pao_sim::anatomy::landmark_files::read_landmark_overrides;
+use pao_sim::anatomy::surfaces::read_closed_surface;
+use pao_sim::volume::nifti::read_nifti_extensions;
+use pao_sim::volume::{
+    nrrd_segment_names, read_dicom_series, read_metaimage, read_nifti, read_nrrd, read_volume,
+};
 use std::path::Path;
 
 #[global_allocator]
@@ -49,9 +58,12 @@ fn readers() -> Vec<Reader> {
         "type_float64.mha",
     ]);
     let segments = of(&["layers.seg.nrrd"]);
+    let file = |name: &str| Seed::files(vec![Path::new("tests/data").join(name)]);
+    let layers = file("vsd/SMIR.Body.076Y.M.CT.1/layers.seg.nrrd");
+    let named = nifti.clone();
     let any = [&nifti[..], &nrrd, &metaimage].concat();
     let reader = Reader::new;
-    vec![
+    let mut all = vec![
         reader("nifti", nifti, |path| {
             fuzzing::said(read_nifti::<i16>(path))
         }),
@@ -65,6 +77,91 @@ fn readers() -> Vec<Reader> {
         reader("any-volume", any, |path| {
             fuzzing::said(read_volume::<i16>(path))
         }),
+        reader("nifti-extensions", named, |path| {
+            fuzzing::said(read_nifti_extensions(path))
+        }),
+        reader("deepfluoro", vec![file("deepfluoro.h5")], |path| {
+            fuzzing::said(read_deepfluoro(path, None))
+        })
+        .memory(64, 16 << 20),
+        reader("vsd-segmentation", vec![layers], |path| {
+            fuzzing::said(read_segmentation(path))
+        })
+        .memory(64, 1 << 20),
+        reader("label-table", label_tables(), |path| {
+            fuzzing::said(read_label_table(path))
+        }),
+        // Run lengths and Huffman codes grow a few dozen times.
+        reader("dicom", dicom_slices(), |path| {
+            fuzzing::said(read_dicom_series(path))
+        })
+        .memory(300, 8 << 20),
+    ];
+    for ending in ["ply", "stl", "vtk", "obj"] {
+        let seeds = files("surfaces", ending, &["unstructured.vtk"]);
+        let surfaces = reader(ending, seeds, |path| {
+            fuzzing::said(read_closed_surface(path, PatientFrame::Ras))
+        });
+        all.push(surfaces.memory(200, 1 << 20));
+    }
+    for ending in ["fcsv", "mrk.json", "csv"] {
+        let points = reader(ending, files("points", ending, &[]), |path| {
+            fuzzing::said(read_landmark_overrides(path))
+        });
+        all.push(points.memory(200, 1 << 20));
+    }
+    all
+}
+
+/// The files of a folder with an ending, each a seed, without some.
+fn files(folder: &str, ending: &str, without: &[&str]) -> Vec<Seed> {
+    let entries = std::fs::read_dir(Path::new("tests/data").join(folder)).expect("it is there");
+    let mut paths: Vec<_> = entries
+        .map(|entry| entry.expect("it can be listed").path())
+        .filter(|path| {
+            let name = path
+                .file_name()
+                .expect("a file has a name")
+                .to_string_lossy();
+            name.ends_with(&format!(".{ending}")) && !without.contains(&&*name)
+        })
+        .collect();
+    paths.sort();
+    paths
+        .into_iter()
+        .map(|path| Seed::files(vec![path]))
+        .collect()
+}
+
+/// A slice in each encoding beside a second one of its series, so that pixels are decoded.
+fn dicom_slices() -> Vec<Seed> {
+    let folder = Path::new("tests/data/dicom/encodings");
+    let encodings = [
+        "explicit",
+        "implicit",
+        "big_endian",
+        "deflated",
+        "rle",
+        "jpeg_lossless",
+        "jpeg_lossless_p14",
+    ];
+    let pair = |name| {
+        let paths = [name, "second"].map(|name| folder.join(format!("{name}.dcm")));
+        Seed::files(paths.to_vec())
+    };
+    encodings.into_iter().map(pair).collect()
+}
+
+fn label_tables() -> Vec<Seed> {
+    let csv = "value,structure\n1,hips\n2,femora\n3,sacrum\n";
+    let slicer = "# Color table\n0 Background 0 0 0 0\n1 hip_left 230 200 150 255\n2 hip_right 1 2 3 255\n\
+                  3 femur_left 1 2 3 255\n4 femur_right 1 2 3 255\n5 sacrum 9 9 9 255\n6 bladder 9 9 9 255\n";
+    let itksnap =
+        "0 0 0 0 0 0 0 \"Clear Label\"\n1 255 0 0 1 1 1 \"pelvis\"\n2 0 255 0 1 1 1 \"femora\"\n";
+    vec![
+        Seed::made("table.csv", csv.into()),
+        Seed::made("table.ctbl", slicer.into()),
+        Seed::made("labels.txt", itksnap.into()),
     ]
 }
 

@@ -15,6 +15,7 @@ pub struct Reader {
     name: &'static str,
     seeds: Vec<Seed>,
     read: fn(&Path) -> Result<(), String>,
+    memory: (u64, u64),
 }
 
 impl Reader {
@@ -23,7 +24,21 @@ impl Reader {
         seeds: Vec<Seed>,
         read: fn(&Path) -> Result<(), String>,
     ) -> Self {
-        Self { name, seeds, read }
+        Self {
+            name,
+            seeds,
+            read,
+            memory: (8, 256 << 10),
+        }
+    }
+
+    /// What a read may take in all: so many times the file's bytes and those they decompress to, and a constant
+    /// (buffers, a decoder's window, tables that a library makes once). Default: 8 times, 256 KiB.
+    pub fn memory(self, times: u64, constant: u64) -> Self {
+        Self {
+            memory: (times, constant),
+            ..self
+        }
     }
 }
 

@@ -14,11 +14,6 @@ use std::time::{Duration, Instant};
 /// A read that takes longer hangs. A healthy one takes a ten-thousandth of it.
 const HANG: Duration = Duration::from_secs(60);
 
-/// What a read may take in all: so many times the file's bytes and those they decompress to, and a constant
-/// (buffers, a decoder's window, tables that a library makes once).
-const MEMORY_FACTOR: u64 = 8;
-const MEMORY_BYTES: u64 = 256 << 10;
-
 /// Where a panic happened.
 static PANIC: Mutex<String> = Mutex::new(String::new());
 
@@ -168,7 +163,8 @@ impl Fuzzing<'_> {
             return None;
         };
         let stored: u64 = seed.files.iter().map(|(_, bytes)| bytes.len() as u64).sum();
-        let within = |bytes: u64| peak <= MEMORY_FACTOR * bytes + MEMORY_BYTES;
+        let (times, constant) = self.reader.memory;
+        let within = |bytes: u64| peak <= times * bytes + constant;
         if !within(stored) {
             let inside: u64 = seed
                 .files
