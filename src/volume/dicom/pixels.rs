@@ -43,7 +43,7 @@ impl Slice {
         let whole =
             [format.slope, format.intercept].map(|v| (v.fract() == 0.0).then_some(v as i64));
         for (offset, (bytes, voxel)) in raw.as_chunks::<N>().0.iter().zip(out).enumerate() {
-            let stored = format.from_bits(bits(*bytes));
+            let stored = format.number(bits(*bytes));
             let padding = format
                 .padding
                 .is_some_and(|(low, high)| (low..=high).contains(&stored));

@@ -188,9 +188,9 @@ fn pixel_format(data: &DataSet) -> Result<PixelFormat, VolumeFileError> {
     };
     if let Some(value) = data.whole(tags::PIXEL_PADDING_VALUE)? {
         // Its own type, signed or not, is written by some as the other one: the bits are meant.
-        let value = format.from_bits(value as u32);
+        let value = format.number(value as u32);
         let limit = data.whole(tags::PIXEL_PADDING_RANGE_LIMIT)?;
-        let limit = limit.map_or(value, |limit| format.from_bits(limit as u32));
+        let limit = limit.map_or(value, |limit| format.number(limit as u32));
         format.padding = Some((value.min(limit), value.max(limit)));
     }
     Ok(format)
@@ -199,7 +199,7 @@ fn pixel_format(data: &DataSet) -> Result<PixelFormat, VolumeFileError> {
 impl PixelFormat {
     /// The number that the stored bits mean, whatever lies above them.
     #[inline]
-    pub fn from_bits(&self, bits: u32) -> i64 {
+    pub fn number(&self, bits: u32) -> i64 {
         let unused = 32 - self.bits_stored;
         if self.signed {
             i64::from((bits << unused) as i32 >> unused)
