@@ -64,6 +64,9 @@ fn the_smoke_study_is_whole_and_says_that_it_is_reduced() {
         report.contains("8 of 8 registrations are complete"),
         "{report}"
     );
+    let list = std::fs::read_to_string(results.join("smoke/report/specimens.csv")).unwrap();
+    assert!(list.contains("\nphantom-1,phantom,male,none,"), "{list}");
+    assert!(report.contains("**Specimens**"), "{report}");
     let group = results.join("smoke/report/phantom-paper");
     for file in [
         "table1.csv",
