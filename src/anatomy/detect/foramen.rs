@@ -1,9 +1,10 @@
 //! The obturator foramen's points of maximal curvature.
 
 use super::closed_curve::{length, resampled, smoothed};
+use super::spot::{FLAT_MM, Spot, rms};
 use super::{DetectError, outline::Outline};
 use crate::anatomy::Side;
-use crate::geometry::{Point, Vector};
+use crate::geometry::Vector;
 use crate::volume::Surface;
 use nalgebra::Vector2;
 
@@ -22,10 +23,10 @@ const INFERIOR_WITHIN_DEG: f64 = 40.0;
 const MIN_AREA_MM2: f64 = 100.0;
 
 /// The two corners, in the world (LPS, mm).
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub(super) struct ForamenCorners {
-    pub medial: Point,
-    pub inferior: Point,
+    pub medial: Result<Spot, DetectError>,
+    pub inferior: Result<Spot, DetectError>,
 }
 
 /// The points of maximal curvature on the medial and on the inferior part of the foramen's edge as
@@ -57,7 +58,9 @@ pub(super) fn foramen_corners(
         sharpest(&smooth, &toward, within_deg)
             .and_then(|i| {
                 let outward = (edge[i] - center).normalize();
-                outline.surface_point(&(edge[i] + outward * 0.4))
+                let point = outline.surface_point(&(edge[i] + outward * 0.4))?;
+                let flat_mm = blunt(&smooth, i);
+                Some(Spot { point, flat_mm })
             })
             .ok_or_else(|| not_found(what, "the foramen's edge has no corner there".into()))
     };
@@ -66,12 +69,12 @@ pub(super) fn foramen_corners(
             "medial corner of the obturator foramen",
             Vector2::new(-1.0, 0.0),
             MEDIAL_WITHIN_DEG,
-        )?,
+        ),
         inferior: corner(
             "inferior corner of the obturator foramen",
             Vector2::new(0.0, -1.0),
             INFERIOR_WITHIN_DEG,
-        )?,
+        ),
     })
 }
 
@@ -86,6 +89,19 @@ fn edge(outline: &Outline, center: &Vector2<f64>) -> Option<Vec<Vector2<f64>>> {
         })
         .collect();
     around.map(|points| resampled(&points, POINTS))
+}
+
+/// Root mean square distance to the points on either side of a corner that reach as far outward to
+/// within [`FLAT_MM`].
+fn blunt(curve: &[Vector2<f64>], corner: usize) -> f64 {
+    let n = curve.len();
+    let tangent = curve[(corner + 1) % n] - curve[(corner + n - 1) % n];
+    let outward = Vector2::new(tangent.y, -tangent.x).normalize();
+    let arm = |k: usize| curve[(corner + k) % n] - curve[corner];
+    let as_far = |k: &usize| arm(*k).dot(&outward).abs() <= FLAT_MM;
+    let forward = (0..n / 2).take_while(as_far);
+    let back = (1..n / 2).map(|k| n - k).take_while(as_far);
+    rms(forward.chain(back).map(|k| arm(k).norm_squared()))
 }
 
 /// The local maximum of curvature that is largest among those whose outward normal points
