@@ -54,8 +54,8 @@ pub(super) fn checks(specimen: &Specimen, bones: &Bones) -> Vec<Check> {
         "labels' surface outside the CT's edges of bone",
         -thin,
         "mm",
-        (-0.5 * voxel, 0.5 * voxel),
-        (-1.5 * voxel, 1.5 * voxel),
+        (-0.8 * voxel, 0.8 * voxel),
+        (-2.0 * voxel, 2.0 * voxel),
     );
     thick.found = format!("{:.2} mm", -thin);
     vec![

@@ -85,7 +85,7 @@ pub(super) fn checks(specimen: &Arc<Specimen>, bones: &Bones, side: Side) -> Vec
         what,
         -lowest,
         "mm",
-        (140.0, 500.0),
+        (130.0, 500.0),
         (50.0, 500.0),
     )
     .advise(

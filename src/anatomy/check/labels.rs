@@ -15,6 +15,9 @@ const SHELL_MM: (f64, f64) = (2.0, 4.0);
 /// contrast-filled vessels apart.
 const BONE_HU: i16 = 300;
 
+/// The smallest bone of the pelvis is more than this part of its label.
+const BONE_SHARE: usize = 10;
+
 /// The spine goes on above the sacrum and is not labelled, femora end where the label does: this much of
 /// a label's height at its open end is not looked at.
 const OPEN_END: f64 = 0.12;
@@ -51,7 +54,12 @@ fn islands(mask: &Volume<bool>, label: Label, name: &str) -> Check {
     let mut sizes = components(mask).sizes;
     sizes.sort_unstable_by(|a, b| b.cmp(a));
     let main = if label == Label::Pelvis { 3 } else { 1 };
-    let scattered: usize = sizes.iter().skip(main).sum();
+    let total: usize = sizes.iter().sum();
+    let bones = sizes
+        .iter()
+        .take(main)
+        .take_while(|size| **size * BONE_SHARE >= total);
+    let scattered = total - bones.sum::<usize>();
     let what = match main {
         1 => format!("{name} outside its largest piece"),
         n => format!("{name} outside its {n} largest pieces"),
@@ -128,7 +136,7 @@ fn leak(specimen: &Specimen, label: Label, name: &str) -> Check {
     }
     let percent = 100.0 * bright as f64 / shell.max(1) as f64;
     let what = format!("bone beside the {name}'s label");
-    Check::number(what, percent, "%", (0.0, 4.0), (0.0, 30.0)).advise(
+    Check::number(what, percent, "%", (0.0, 1.0), (0.0, 30.0)).advise(
         "what the label lacks is missing from DRRs and from collisions, and stays behind when the bone \
          moves; complete the label, or look whether it is shifted",
     )
