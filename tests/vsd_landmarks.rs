@@ -1,10 +1,12 @@
 //! Landmarks found by rule on the bones of six people, beside those that five raters placed on
 //! the same bones.
 
+mod bones;
 mod data;
 
+use bones::{apart, asymmetry, rank_correlation, surfaces, voxelized};
 use data::SUBJECTS;
-use pao_sim::anatomy::detect::detect;
+use pao_sim::anatomy::detect::{Detected, Extra, detect};
 use pao_sim::anatomy::surfaces::read_bone_surfaces;
 use pao_sim::anatomy::{Landmark, Side};
 use pao_sim::geometry::Point;
@@ -30,13 +32,27 @@ fn landmarks_lie_where_raters_place_them() {
     let text = std::fs::read_to_string(data.join("landmarks.json")).unwrap();
     let all: serde_json::Value = serde_json::from_str(&text).unwrap();
     let mut worst = Vec::new();
-    println!("subject side landmark distance_mm rater_sd_mm limit_mm");
+    let (mut distances, mut scatters, mut uncertainties) = (Vec::new(), Vec::new(), Vec::new());
+    println!("subject side landmark distance_mm rater_sd_mm uncertainty_mm limit_mm");
     for subject in SUBJECTS {
         let bones = read_bone_surfaces(&data.join(subject)).unwrap();
         let found = detect(&bones).unwrap();
         for side in Side::BOTH {
-            let at = |landmark| found.landmarks.get(landmark, side).unwrap();
-            for (name, point) in [
+            let uncertainty = |landmark| {
+                let from = found.landmarks.provenance(landmark, side).unwrap();
+                from.uncertainty_mm.unwrap()
+            };
+            let at = |landmark| Extra {
+                point: found.landmarks.get(landmark, side).unwrap(),
+                uncertainty_mm: uncertainty(landmark),
+            };
+            for (
+                name,
+                Extra {
+                    point,
+                    uncertainty_mm,
+                },
+            ) in [
                 ("ASIS", at(Landmark::Asis)),
                 ("AIIS", at(Landmark::Aiis)),
                 ("Pubic Tubercle (PT)", found.pubic_tubercles[side.index()]),
@@ -44,7 +60,12 @@ fn landmarks_lie_where_raters_place_them() {
             ] {
                 let (mean, sd) = raters(&all, subject, side, name);
                 let (distance, limit) = ((point - mean).norm(), (2.0 * sd).max(5.0));
-                println!("{subject} {side} {name} {distance:.1} {sd:.1} {limit:.1}");
+                println!(
+                    "{subject} {side} {name} {distance:.1} {sd:.1} {uncertainty_mm:.1} {limit:.1}"
+                );
+                distances.push(distance);
+                scatters.push(sd);
+                uncertainties.push(uncertainty_mm);
                 if distance > limit {
                     worst.push(format!(
                         "{subject} {side} {name}: {distance:.1} of {limit:.1} mm"
@@ -54,14 +75,98 @@ fn landmarks_lie_where_raters_place_them() {
             let head = found.heads[side.index()];
             let rim = &found.rims[side.index()];
             println!(
-                "{subject} {side} head radius {:.2} rms {:.2} mm, {} vertices; rim {} points",
+                "{subject} {side} head radius {:.2} rms {:.2} mm, {} vertices; rim {} points, {:.1} mm",
                 head.radius_mm,
                 head.rms_mm,
                 head.vertices,
-                rim.len()
+                rim.len(),
+                rim.provenance.uncertainty_mm.unwrap()
             );
+            let all = Landmark::ALL.map(|l| format!("{} {:.1}", l.name(), uncertainty(l)));
+            println!("{subject} {side} uncertainties: {}", all.join(", "));
             assert!(head.rms_mm < 1.0, "{subject} {side}");
         }
     }
     assert!(worst.is_empty(), "{worst:#?}");
+    calibrated(&distances, &scatters, &uncertainties);
+}
+
+/// Uncertainties rank landmarks as the raters' scatter and the distances do, and are of their size.
+fn calibrated(distances: &[f64], scatters: &[f64], uncertainties: &[f64]) {
+    let with_scatter = rank_correlation(uncertainties, scatters);
+    let with_distance = rank_correlation(uncertainties, distances);
+    let raters = rank_correlation(scatters, distances);
+    let size = |values: &[f64]| {
+        let squares = values
+            .iter()
+            .zip(uncertainties)
+            .map(|(v, u)| (v / u).powi(2));
+        (squares.sum::<f64>() / values.len() as f64).sqrt()
+    };
+    let beyond = distances
+        .iter()
+        .zip(uncertainties)
+        .filter(|(d, u)| *d > *u)
+        .count();
+    println!(
+        "rank correlation of uncertainty with scatter {with_scatter:.2}, with distance {with_distance:.2} \
+         (scatter with distance {raters:.2}); RMS of distance / uncertainty {:.2}, of scatter / uncertainty \
+         {:.2}; {beyond} of {} farther than the uncertainty",
+        size(distances),
+        size(scatters),
+        distances.len()
+    );
+    assert!(with_scatter > 0.5, "{with_scatter}");
+    assert!(with_distance > 0.2, "{with_distance}");
+    assert!((0.4..1.0).contains(&size(distances)));
+    assert!((0.6..1.4).contains(&size(scatters)));
+}
+
+/// What thicker slices of the same bones do, and how symmetric the landmarks are.
+#[test]
+fn landmarks_bear_thick_slices_and_mirror_each_other() {
+    let Some(data) = data::vsd() else { return };
+    let mut moves = Vec::new();
+    for subject in SUBJECTS {
+        let bones = read_bone_surfaces(&data.join(subject)).unwrap();
+        let found = detect(&bones).unwrap();
+        let pairs = Landmark::ALL.into_iter().zip(asymmetry(&found));
+        let line: Vec<String> = pairs
+            .map(|(landmark, mm)| format!("{} {mm:.1}", landmark.name()))
+            .collect();
+        println!("{subject} left from mirrored right: {} mm", line.join(", "));
+        let masks = voxelized(&bones);
+        for thickness in 1..=3 {
+            let again = detect(&surfaces(&masks, thickness)).unwrap();
+            let mut line = Vec::new();
+            for landmark in Landmark::ALL {
+                for side in Side::BOTH {
+                    let at = |of: &Detected| of.landmarks.get(landmark, side).unwrap();
+                    let moved = (at(&again) - at(&found)).norm();
+                    line.push(format!("{} {moved:.1}", landmark.key(side)));
+                    let from = found.landmarks.provenance(landmark, side).unwrap();
+                    let uncertainty_mm = from.uncertainty_mm.unwrap();
+                    // The head's sphere is surer than slices of voxels are.
+                    if landmark != Landmark::Fh {
+                        moves.push(moved / uncertainty_mm);
+                    } else {
+                        assert!(moved < 0.5, "{subject} {side} {thickness} mm: {moved}");
+                    }
+                }
+            }
+            for side in Side::BOTH {
+                let (mean, most) = apart(&again.rims[side.index()], &found.rims[side.index()]);
+                line.push(format!("{side} rim {mean:.1} (most {most:.1})"));
+            }
+            println!("{subject} {thickness} mm slices: {}", line.join(", "));
+        }
+    }
+    let square = moves.iter().map(|m| m * m).sum::<f64>() / moves.len() as f64;
+    let far = moves.iter().filter(|m| **m > 2.0).count();
+    println!(
+        "moved by thick slices: RMS {:.2} uncertainties, {far} of {} by more than two",
+        square.sqrt(),
+        moves.len()
+    );
+    assert!(square.sqrt() < 1.0 && far * 50 < moves.len());
 }

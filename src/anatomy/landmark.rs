@@ -1,6 +1,6 @@
 //! The landmarks of DESIGN section 1.
 
-use super::Side;
+use super::{Provenance, Side};
 use crate::geometry::Point;
 use std::collections::BTreeMap;
 use std::str::FromStr;
@@ -77,23 +77,33 @@ impl FromStr for Landmark {
 /// The landmarks of a specimen, in the world of its CT (LPS, mm).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Landmarks {
-    points: BTreeMap<(Landmark, Side), Point>,
+    points: BTreeMap<(Landmark, Side), (Point, Provenance)>,
 }
 
 impl Landmarks {
-    /// Sets one landmark.
+    /// Sets one landmark that came with the data; one that was found before is overridden.
     pub fn set(&mut self, landmark: Landmark, side: Side, point: Point) {
-        self.points.insert((landmark, side), point);
+        self.set_with(landmark, side, point, Provenance::GIVEN);
+    }
+
+    /// Sets one landmark and how it came to be known.
+    pub fn set_with(&mut self, landmark: Landmark, side: Side, point: Point, from: Provenance) {
+        self.points.insert((landmark, side), (point, from));
     }
 
     /// One landmark, or `None` if the specimen lacks it.
     pub fn get(&self, landmark: Landmark, side: Side) -> Option<Point> {
-        self.points.get(&(landmark, side)).copied()
+        self.points.get(&(landmark, side)).map(|of| of.0)
+    }
+
+    /// How a landmark came to be known, or `None` if the specimen lacks it.
+    pub fn provenance(&self, landmark: Landmark, side: Side) -> Option<Provenance> {
+        self.points.get(&(landmark, side)).map(|of| of.1)
     }
 
     /// Every landmark that is there, in a fixed order.
     pub fn iter(&self) -> impl Iterator<Item = (Landmark, Side, Point)> + '_ {
-        self.points.iter().map(|(&(l, s), &p)| (l, s, p))
+        self.points.iter().map(|(&(l, s), of)| (l, s, of.0))
     }
 
     /// The names of those that are missing, for error messages.

@@ -1,6 +1,6 @@
 //! The mirror image of a specimen, for the test that left and right are treated alike.
 
-use super::{Label, Landmarks, Side, Specimen};
+use super::{Label, Landmarks, Rim, Side, Specimen};
 use crate::geometry::Point;
 use crate::volume::{Grid, Volume};
 use nalgebra::Matrix3;
@@ -10,9 +10,14 @@ use nalgebra::Matrix3;
 pub fn mirror(specimen: &Specimen) -> Specimen {
     let mut landmarks = Landmarks::default();
     for (landmark, side, point) in specimen.landmarks.iter() {
-        landmarks.set(landmark, side.opposite(), reflected(&point));
+        let from = specimen.landmarks.provenance(landmark, side);
+        let point = reflected(&point);
+        landmarks.set_with(landmark, side.opposite(), point, from.unwrap_or_default());
     }
-    let rim = |side: Side| specimen.rim(side).iter().map(reflected).collect();
+    let rim = |side: Side| {
+        let points = specimen.rim(side).iter().map(reflected).collect();
+        Rim::new(points, specimen.rims[side.index()].provenance)
+    };
     Specimen {
         name: format!("{}-mirrored", specimen.name),
         source: specimen.source.clone(),
@@ -82,7 +87,7 @@ mod tests {
             ct: Volume::new(grid.clone(), (0..24).collect()),
             labels: Volume::new(grid, (0..24).map(|i| i % 4).collect()),
             landmarks,
-            rims: [rim, Vec::new()],
+            rims: [rim.into(), Rim::default()],
         }
     }
 

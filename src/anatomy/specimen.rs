@@ -1,6 +1,6 @@
 //! One body.
 
-use super::{Landmarks, Side};
+use super::{Landmarks, Rim, Side};
 use crate::geometry::Point;
 use crate::volume::Volume;
 use serde::{Deserialize, Serialize};
@@ -17,9 +17,8 @@ pub struct Specimen {
     /// [`super::Label`] values on the same grid as `ct`.
     pub labels: Volume<u8>,
     pub landmarks: Landmarks,
-    /// The acetabular rim's trace of each side ([`Side::index`]), an ordered closed polyline of
-    /// points a few mm apart.
-    pub rims: [Vec<Point>; 2],
+    /// The acetabular rim's trace of each side ([`Side::index`]).
+    pub rims: [Rim; 2],
 }
 
 impl Specimen {

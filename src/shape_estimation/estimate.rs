@@ -128,7 +128,7 @@ mod tests {
             ct: Volume::filled(grid.clone(), 0),
             labels: Volume::filled(grid, 0),
             landmarks,
-            rims: [Vec::new(), Vec::new()],
+            rims: Default::default(),
         };
         Hip::new(Arc::new(specimen), side).unwrap()
     }

@@ -15,6 +15,11 @@ pub(super) fn checks(specimen: &Specimen, bones: &Bones) -> Vec<Check> {
     let nearest = pairs.min_by(|a, b| a.1.total_cmp(&b.1));
     let (landmark, apart) = nearest.unwrap_or((Landmark::Asis, f64::NAN));
     let femurs = Side::BOTH.map(|side| center(&bones.femurs[side.index()]));
+    let swapped = "every result would carry the other side's name, and cuts would lie outside the patient: \
+                   points or labels of RAS read as LPS, or left and right under each other's name; mend the \
+                   file, or say its convention to the importer";
+    let tilted = "the APP follows from both ASIS and IPS: with one of them wrong, all angles of cuts and movements \
+                  are; a patient who lies so is fine, else pick the point anew";
     let mut checks = vec![
         Check::holds(
             "landmarks of the left, from their right partners",
@@ -24,14 +29,16 @@ pub(super) fn checks(specimen: &Specimen, bones: &Bones) -> Vec<Check> {
                 landmark.name()
             ),
             "all to the patient's left (+x)",
-        ),
+        )
+        .advise(swapped),
         Check::number(
             "label of the left femur, from the right one's, along LPS x",
             femurs[0].x - femurs[1].x,
             "mm",
             (120.0, 300.0),
             (60.0, 400.0),
-        ),
+        )
+        .advise(swapped),
     ];
     let (Some(left), Some(right), Some(head)) = (
         at(Landmark::Asis, Side::Left),
@@ -42,46 +49,29 @@ pub(super) fn checks(specimen: &Specimen, bones: &Bones) -> Vec<Check> {
     };
     let what = "both ASIS apart";
     let apart = (left - right).norm();
-    checks.push(Check::number(
-        what,
-        apart,
-        "mm",
-        (170.0, 310.0),
-        (120.0, 360.0),
-    ));
+    checks.push(Check::number(what, apart, "mm", (170.0, 310.0), (120.0, 360.0)).advise(tilted));
     match app_from_volume(&specimen.landmarks, &head) {
         Ok(app) => {
             let matrix = app.rotation.to_rotation_matrix().into_inner();
-            checks.extend(axes(&matrix));
+            checks.extend(axes(&matrix).into_iter().map(|check| check.advise(tilted)));
             let y = |p: &Point| (app * p).y;
             let z = |p: &Point| (app * p).z;
             let pelvis = center(&bones.pelvis);
             let femora = nalgebra::center(&femurs[0], &femurs[1]);
             let what = "pelvis above the femora along APP y";
             let above = y(&pelvis) - y(&femora);
-            checks.push(Check::number(
-                what,
-                above,
-                "mm",
-                (50.0, 250.0),
-                (10.0, 400.0),
-            ));
+            checks.push(
+                Check::number(what, above, "mm", (50.0, 250.0), (10.0, 400.0)).advise(tilted),
+            );
             let what = "both ASIS in front of the pelvis' middle along APP z";
             let front = z(&nalgebra::center(&left, &right)) - z(&pelvis);
-            checks.push(Check::number(
-                what,
-                front,
-                "mm",
-                (20.0, 120.0),
-                (5.0, 200.0),
-            ));
+            checks
+                .push(Check::number(what, front, "mm", (20.0, 120.0), (5.0, 200.0)).advise(tilted));
         }
-        Err(error) => checks.push(Check::holds(
-            "anterior pelvic plane",
-            false,
-            error.to_string(),
-            "a frame",
-        )),
+        Err(error) => checks.push(
+            Check::holds("anterior pelvic plane", false, error.to_string(), "a frame")
+                .advise(tilted),
+        ),
     }
     checks
 }

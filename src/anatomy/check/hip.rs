@@ -34,6 +34,10 @@ pub(super) fn checks(specimen: &Arc<Specimen>, bones: &Bones, side: Side) -> Vec
                 "mm",
                 (0.0, near),
                 (0.0, 10.0),
+            )
+            .advise(
+                "a landmark off the bone tilts the APP or starts registration elsewhere; is it in LPS mm of \
+                 this CT, and on this side? Else pick it anew",
             ));
         }
     }
@@ -49,10 +53,27 @@ pub(super) fn checks(specimen: &Arc<Specimen>, bones: &Bones, side: Side) -> Vec
             false,
             reason.clone(),
             "a sphere fits it",
-        )),
+        )
+        .advise("the hip's centre, about which everything turns, is not known; is the femur's label whole?")),
     }
-    checks.extend(rim_checks(&hip, &bones.pelvis));
+    let radius = found.as_ref().map_or(f64::NAN, |head| head.radius_mm);
+    checks.extend(rim_checks(&hip, &bones.pelvis, radius));
     checks.push(touching(specimen, side));
+    let highest = bones
+        .pelvis
+        .vertices()
+        .iter()
+        .map(|p| hip.app_from_volume * p)
+        .filter(|p| p.coords.dot(&hip.lateral()) > -20.0)
+        .map(|p| p.y)
+        .fold(f64::MIN, f64::max);
+    let what = format!("{side} ilium above the head's centre");
+    checks.push(
+        Check::number(what, highest, "mm", (110.0, 220.0), (75.0, 260.0)).advise(
+            "the ilium cut lies about 50 mm above the head, wires enter at the crest: with less bone there is \
+             no room for them; use a scan that reaches above the crest",
+        ),
+    );
     let femur = &bones.femurs[side.index()];
     let lowest = femur
         .vertices()
@@ -64,8 +85,12 @@ pub(super) fn checks(specimen: &Arc<Specimen>, bones: &Bones, side: Side) -> Vec
         what,
         -lowest,
         "mm",
-        (100.0, 500.0),
+        (130.0, 500.0),
         (50.0, 500.0),
+    )
+    .advise(
+        "the femur's shaft is missing from the lower part of the images, and its rotation is found from \
+         what is left; use a scan that reaches 150 mm below the heads",
     ));
     checks
 }
@@ -91,20 +116,26 @@ fn head_checks(hip: &Hip, head: &Head) -> Vec<Check> {
             own,
             format!("in label {}", label.unwrap_or(0)),
             format!("in label {} ({side} femur)", Label::femur(side).value()),
-        ),
+        )
+        .advise("left and right are swapped in labels or landmarks, or they are of different worlds; check both"),
         Check::number(
             format!("{side} femoral head's radius"),
             head.radius_mm,
             "mm",
             (19.0, 30.0),
             (14.0, 36.0),
-        ),
+        )
+        .advise("no adult's head is so small or large: is the CT's voxel size right, and the label a femur?"),
         Check::number(
             format!("{side} femoral head's residual from the sphere"),
             head.rms_mm,
             "mm",
             (0.0, 1.0),
             (0.0, 2.0),
+        )
+        .advise(
+            "a head that is no sphere turns about no point: collisions and LCE angles depend on it; does the \
+             label hold the whole head and nothing of the socket?",
         ),
         Check::number(
             format!("{side} femoral head's centre from the sphere's"),
@@ -112,11 +143,15 @@ fn head_checks(hip: &Hip, head: &Head) -> Vec<Check> {
             "mm",
             (0.0, 2.0),
             (0.0, 5.0),
+        )
+        .advise(
+            "movements turn about the given centre: the femur then grinds into the socket; give the sphere's \
+             centre, or leave it out to have it found",
         ),
     ]
 }
 
-fn rim_checks(hip: &Hip, pelvis: &Surface) -> Vec<Check> {
+fn rim_checks(hip: &Hip, pelvis: &Surface, head_mm: f64) -> Vec<Check> {
     let side = hip.side;
     let rim = hip.rim_in_app();
     let lps = hip.specimen.rim(side);
@@ -131,7 +166,9 @@ fn rim_checks(hip: &Hip, pelvis: &Surface) -> Vec<Check> {
     let lce = lce_angle(&rim, side, &Rigid::identity(), &Point::origin())
         .map_or(f64::NAN, f64::to_degrees);
     let name = |what: &str| format!("{side} rim{what}");
-    vec![
+    let advice = "cuts keep their distance from the rim, and the LCE angle is read from it: both follow a wrong rim; \
+                  trace it anew, or leave it out to have it found";
+    let checks = vec![
         Check::number(name(" on bone"), share, "%", (70.0, 100.0), (40.0, 100.0)),
         Check::number(
             name("'s mean radius"),
@@ -139,6 +176,13 @@ fn rim_checks(hip: &Hip, pelvis: &Surface) -> Vec<Check> {
             "mm",
             (20.0, 38.0),
             (15.0, 45.0),
+        ),
+        Check::number(
+            name("'s mean radius over the head's"),
+            radius / head_mm,
+            "",
+            (0.95, 1.35),
+            (0.8, 1.6),
         ),
         Check::number(
             name("'s distance from its plane (RMS)"),
@@ -175,7 +219,11 @@ fn rim_checks(hip: &Hip, pelvis: &Surface) -> Vec<Check> {
             (10.0, 50.0),
             (-20.0, 70.0),
         ),
-    ]
+    ];
+    checks
+        .into_iter()
+        .map(|check| check.advise(advice))
+        .collect()
 }
 
 /// Middle, unit normal (on the side of `lateral`) and RMS distance of the best plane.
@@ -230,7 +278,10 @@ fn touching(specimen: &Specimen, side: Side) -> Check {
     }
     let what = format!("{side} femur touching the pelvis over");
     // Single voxels of bones that were segmented apart may touch.
-    Check::number(what, mm2, "mm2", (0.0, 20.0), (0.0, 1000.0))
+    Check::number(what, mm2, "mm2", (0.0, 20.0), (0.0, 1000.0)).advise(
+        "where labels touch, movements of femur and fragment collide at once and are drawn again: only small \
+         ones are left; open the joint space in the label map",
+    )
 }
 
 fn distance(surface: &Surface, point: &Point) -> f64 {

@@ -1,9 +1,10 @@
 //! The obturator foramen's points of maximal curvature.
 
 use super::closed_curve::{length, resampled, smoothed};
+use super::spot::{FLAT_MM, Spot, rms};
 use super::{DetectError, outline::Outline};
 use crate::anatomy::Side;
-use crate::geometry::{Point, Vector};
+use crate::geometry::Vector;
 use crate::volume::Surface;
 use nalgebra::Vector2;
 
@@ -11,21 +12,25 @@ use nalgebra::Vector2;
 const POINTS: usize = 400;
 
 /// Corners are sought on the edge smoothed by this much (mm): small enough to keep the foramen's
-/// three corners, large enough that notches of the edge are none.
-const SMOOTHING_MM: f64 = 5.5;
+/// three corners, large enough that notches of the edge are none. The others, a fifth less and more, tell
+/// how sure a corner is.
+const SMOOTHINGS_MM: [f64; 3] = [5.5, 4.4, 6.6];
 
 /// How far the edge's outward normal at a corner may point away from medial, or from inferior.
 const MEDIAL_WITHIN_DEG: f64 = 50.0;
 const INFERIOR_WITHIN_DEG: f64 = 40.0;
 
+/// A corner with this share of the sharpest one's curvature might as well have been taken.
+const RIVAL: f64 = 0.8;
+
 /// A smaller hole in the bone's shadow is no foramen (mm^2).
 const MIN_AREA_MM2: f64 = 100.0;
 
 /// The two corners, in the world (LPS, mm).
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub(super) struct ForamenCorners {
-    pub medial: Point,
-    pub inferior: Point,
+    pub medial: Result<Spot, DetectError>,
+    pub inferior: Result<Spot, DetectError>,
 }
 
 /// The points of maximal curvature on the medial and on the inferior part of the foramen's edge as
@@ -52,26 +57,32 @@ pub(super) fn foramen_corners(
         return Err(no_hole());
     }
     let edge = edge(&outline, &center).ok_or_else(no_hole)?;
-    let smooth = smoothed(&edge, SMOOTHING_MM * POINTS as f64 / length(&edge));
+    let smooth = SMOOTHINGS_MM.map(|mm| smoothed(&edge, mm * POINTS as f64 / length(&edge)));
     let corner = |what, toward: Vector2<f64>, within_deg: f64| {
-        sharpest(&smooth, &toward, within_deg)
-            .and_then(|i| {
-                let outward = (edge[i] - center).normalize();
-                outline.surface_point(&(edge[i] + outward * 0.4))
-            })
-            .ok_or_else(|| not_found(what, "the foramen's edge has no corner there".into()))
+        let corners = smooth
+            .each_ref()
+            .map(|curve| sharpest(curve, &toward, within_deg));
+        let best = corners[0].first().and_then(|&i| {
+            let outward = (edge[i] - center).normalize();
+            let point = outline.surface_point(&(edge[i] + outward * 0.4))?;
+            let as_sharp = smooth.iter().zip(&corners);
+            let as_sharp = as_sharp.flat_map(|(curve, corners)| blunt(curve, corners));
+            let flat_mm = rms(as_sharp.map(|p| (p - smooth[0][i]).norm_squared()));
+            Some(Spot { point, flat_mm })
+        });
+        best.ok_or_else(|| not_found(what, "the foramen's edge has no corner there".into()))
     };
     Ok(ForamenCorners {
         medial: corner(
             "medial corner of the obturator foramen",
             Vector2::new(-1.0, 0.0),
             MEDIAL_WITHIN_DEG,
-        )?,
+        ),
         inferior: corner(
             "inferior corner of the obturator foramen",
             Vector2::new(0.0, -1.0),
             INFERIOR_WITHIN_DEG,
-        )?,
+        ),
     })
 }
 
@@ -88,9 +99,24 @@ fn edge(outline: &Outline, center: &Vector2<f64>) -> Option<Vec<Vector2<f64>>> {
     around.map(|points| resampled(&points, POINTS))
 }
 
-/// The local maximum of curvature that is largest among those whose outward normal points
-/// `toward` within an angle.
-fn sharpest(curve: &[Vector2<f64>], toward: &Vector2<f64>, within_deg: f64) -> Option<usize> {
+/// The points on either side of any of the corners that reach as far outward to within [`FLAT_MM`].
+fn blunt(curve: &[Vector2<f64>], corners: &[usize]) -> Vec<Vector2<f64>> {
+    let n = curve.len();
+    let around = |&corner: &usize| {
+        let tangent = curve[(corner + 1) % n] - curve[(corner + n - 1) % n];
+        let outward = Vector2::new(tangent.y, -tangent.x).normalize();
+        let as_far = move |p: &Vector2<f64>| (p - curve[corner]).dot(&outward).abs() <= FLAT_MM;
+        let at = move |k: usize| curve[(corner + k) % n];
+        let forward = (0..n / 2).map(at).take_while(as_far);
+        let back = (1..n / 2).map(move |k| at(n - k)).take_while(as_far);
+        forward.chain(back).collect::<Vec<_>>()
+    };
+    corners.iter().flat_map(around).collect()
+}
+
+/// The local maxima of curvature, the sharpest first, that are nearly as sharp ([`RIVAL`]) among those
+/// whose outward normal points `toward` within an angle.
+fn sharpest(curve: &[Vector2<f64>], toward: &Vector2<f64>, within_deg: f64) -> Vec<usize> {
     let n = curve.len();
     let step = |i: usize, k: isize| curve[(i as isize + k).rem_euclid(n as isize) as usize];
     let curvature: Vec<f64> = (0..n)
@@ -100,7 +126,7 @@ fn sharpest(curve: &[Vector2<f64>], toward: &Vector2<f64>, within_deg: f64) -> O
             (first.x * second.y - first.y * second.x) / first.norm().powi(3)
         })
         .collect();
-    (0..n)
+    let mut peaks: Vec<usize> = (0..n)
         .filter(|&i| {
             let tangent = (step(i, 1) - step(i, -1)).normalize();
             let outward = Vector2::new(tangent.y, -tangent.x);
@@ -109,5 +135,10 @@ fn sharpest(curve: &[Vector2<f64>], toward: &Vector2<f64>, within_deg: f64) -> O
                 && curvature[i] >= curvature[(i + 1) % n];
             peak && outward.dot(toward) > within_deg.to_radians().cos()
         })
-        .max_by(|&a, &b| curvature[a].total_cmp(&curvature[b]))
+        .collect();
+    // Of equal ones the last.
+    peaks.sort_by(|&a, &b| curvature[b].total_cmp(&curvature[a]).then(b.cmp(&a)));
+    let least = RIVAL * peaks.first().map_or(0.0, |&first| curvature[first]);
+    peaks.retain(|&i| curvature[i] >= least);
+    peaks
 }

@@ -24,6 +24,9 @@ const ROUNDS: i32 = 200;
 /// and fro by less than this (mm), far below the surface's own accuracy.
 const SWAY_MM: f64 = 0.05;
 
+/// Sectors that the jackknife leaves out in turn.
+const SECTORS: usize = 8;
+
 /// A worse fit is refused (mm RMS).
 const MAX_RMS_MM: f64 = 1.0;
 
@@ -37,6 +40,8 @@ pub struct Head {
     pub rms_mm: f64,
     /// Number of those vertices.
     pub vertices: usize,
+    /// Standard deviation of the centre over all axes (mm), by the jackknife.
+    pub uncertainty_mm: f64,
 }
 
 /// Fits a sphere to the part of the head that faces away from the neck: least squares over the
@@ -100,12 +105,49 @@ pub(in crate::anatomy) fn femoral_head(
                 radius_mm: radius,
                 rms_mm,
                 vertices: near.len(),
+                uncertainty_mm: scatter(&near, &center),
             });
         }
     }
     Err(not_found(
         "the sphere's fit does not settle; is the head whole and round?",
     ))
+}
+
+/// The centre's standard deviation by the jackknife: from spheres without one in turn of the
+/// [`SECTORS`] sectors around the axis that the head's vertices look along. A head that is no sphere
+/// gives each its own centre. Single vertices say nothing here: neighbours err together.
+fn scatter(near: &[Vector], center: &Vector) -> f64 {
+    let mean: Vector = near.iter().map(|p| p - center).sum();
+    let Some(axis) = mean.try_normalize(1e-9) else {
+        return f64::NAN;
+    };
+    let mut beside = Vector::zeros();
+    beside[axis.iamin()] = 1.0;
+    let u = axis.cross(&beside).normalize();
+    let v = axis.cross(&u);
+    let sector = |p: &Vector| {
+        let arm = p - center;
+        let turn = arm.dot(&v).atan2(arm.dot(&u)) / std::f64::consts::TAU + 0.5;
+        ((turn * SECTORS as f64) as usize).min(SECTORS - 1)
+    };
+    let centers: Option<Vec<Vector>> = (0..SECTORS)
+        .map(|left_out| {
+            let rest: Vec<Vector> = near
+                .iter()
+                .copied()
+                .filter(|p| sector(p) != left_out)
+                .collect();
+            sphere(&rest).map(|found| found.0)
+        })
+        .collect();
+    let Some(centers) = centers else {
+        return f64::NAN;
+    };
+    let n = SECTORS as f64;
+    let middle = centers.iter().sum::<Vector>() / n;
+    let square: f64 = centers.iter().map(|c| (c - middle).norm_squared()).sum();
+    ((n - 1.0) / n * square).sqrt()
 }
 
 /// The algebraic least-squares sphere: |p|^2 = 2 c.p + (r^2 - |c|^2).

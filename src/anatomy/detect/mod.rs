@@ -16,11 +16,12 @@ mod outline;
 mod pelvic_frame;
 mod prominence;
 mod rim;
+mod spot;
 mod symphysis;
 
 pub use bones::BoneSurfaces;
 pub use error::DetectError;
 pub use head::Head;
 pub(in crate::anatomy) use head::femoral_head;
-pub use landmarks::{Detected, detect};
+pub use landmarks::{Detected, Extra, detect};
 pub(in crate::anatomy) use local::Local;

@@ -1,5 +1,6 @@
 //! The greater sciatic notch.
 
+use super::spot::{FLAT_MM, Spot, rms};
 use super::{DetectError, local::Local, outline::Outline};
 use crate::anatomy::Side;
 use crate::geometry::Point;
@@ -16,7 +17,7 @@ pub(super) fn greater_sciatic_notch(
     local: &Local,
     radius_mm: f64,
     ischial_spine: &Point,
-) -> Result<Point, DetectError> {
+) -> Result<Spot, DetectError> {
     let not_found = |reason: &str| DetectError::NotFound {
         what: "greater sciatic notch",
         side,
@@ -46,7 +47,7 @@ pub(super) fn greater_sciatic_notch(
     let (low, high) = (flat(ischial_spine), flat(ilium));
     let along = high - low;
     let forward = Vector2::new(along.y, -along.x).normalize();
-    let mut deepest: Option<(f64, Vector2<f64>)> = None;
+    let mut edge: Vec<(f64, Vector2<f64>)> = Vec::new();
     for percent in 5..=95 {
         let start = low + along * (f64::from(percent) / 100.0);
         if outline.covered(&start) {
@@ -55,13 +56,18 @@ pub(super) fn greater_sciatic_notch(
         let depth = outline
             .distance(&start, &forward, 150.0)
             .ok_or_else(|| not_found("nothing closes it in front"))?;
-        if deepest.is_none_or(|(most, _)| depth > most) {
-            deepest = Some((depth, start));
-        }
+        edge.push((depth, start + forward * depth));
     }
-    let (depth, start) =
-        deepest.ok_or_else(|| not_found("bone fills it between ischial spine and ilium"))?;
+    // The first of equally deep ones.
+    let &(depth, deepest) = edge
+        .iter()
+        .rev()
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .ok_or_else(|| not_found("bone fills it between ischial spine and ilium"))?;
+    let as_deep = edge.iter().filter(|e| e.0 >= depth - FLAT_MM);
+    let flat_mm = rms(as_deep.map(|e| (e.1 - deepest).norm_squared()));
     outline
-        .surface_point(&(start + forward * (depth + 0.4)))
+        .surface_point(&(deepest + forward * 0.4))
+        .map(|point| Spot { point, flat_mm })
         .ok_or_else(|| not_found("its edge could not be met"))
 }

@@ -5,6 +5,7 @@ use super::{BoneSurfaces, DetectError, local::Local};
 use crate::anatomy::Side;
 use crate::geometry::{Point, Vector};
 use crate::volume::Surface;
+use nalgebra::Rotation3;
 
 /// The iteration settles in two or three rounds; each visits a finite set of vertices.
 const MAX_ROUNDS: usize = 30;
@@ -24,6 +25,19 @@ impl PelvicFrame {
     /// Distance of the two iliac points in mm: the size that regions scale with.
     pub fn width(&self) -> f64 {
         (self.ilium[0] - self.ilium[1]).norm()
+    }
+
+    /// The same pelvis in turned directions.
+    pub fn turned(&self, turn: &Rotation3<f64>) -> Self {
+        Self {
+            axes: self.axes.map(|axis| turn * axis),
+            ..self.clone()
+        }
+    }
+
+    /// World directions: to the patient's left, superior, anterior.
+    pub fn axes(&self) -> [Vector; 3] {
+        self.axes
     }
 
     /// The frame of one side.

@@ -1,6 +1,8 @@
 //! Bony prominences: the extreme point of a region in one direction.
 
-use super::{DetectError, local::Local, local::forward};
+use super::local::{Local, forward};
+use super::spot::{FLAT_MM, Spot};
+use super::{DetectError, Head};
 use crate::anatomy::Side;
 use crate::geometry::{Point, Vector};
 use crate::volume::Surface;
@@ -10,12 +12,12 @@ use crate::volume::Surface;
 const BORDER_MM: f64 = 0.5;
 
 /// The prominences of one hip bone, in the world (LPS, mm).
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub(super) struct Prominences {
-    pub asis: Point,
-    pub aiis: Point,
-    pub pubic_tubercle: Point,
-    pub ischial_spine: Point,
+    pub asis: Result<Spot, DetectError>,
+    pub aiis: Result<Spot, DetectError>,
+    pub pubic_tubercle: Result<Spot, DetectError>,
+    pub ischial_spine: Result<Spot, DetectError>,
 }
 
 /// Finds the prominences of a hip bone. The directions are anatomical (spines and tubercle look
@@ -29,59 +31,66 @@ pub(super) fn prominences(
     hip: &Surface,
     side: Side,
     local: &Local,
-    radius_mm: f64,
+    head: &Head,
     ilium: &Point,
     midline: &Point,
     width_mm: f64,
-) -> Result<Prominences, DetectError> {
+) -> Prominences {
+    let radius_mm = head.radius_mm;
     let front = local.coordinates(ilium);
     let symphysis = local.coordinates(midline);
-    let find = |what, direction, region: &dyn Fn(&Vector) -> f64| {
+    let find = |what, direction, region: &dyn Fn(&Vector) -> f64| -> Result<Spot, DetectError> {
         extreme(hip, local, direction, region).ok_or(DetectError::NotFound {
             what,
             side,
             reason: "the bone has no prominence where it is expected".into(),
         })
     };
-    Ok(Prominences {
+    Prominences {
         asis: find(
             "anterior superior iliac spine",
             forward(10.0, -10.0),
             &|p| (p.y - front.y / 2.0).min(p.z),
-        )?,
+        ),
         // Between the roof of the socket and the notch below the superior spine.
         aiis: find(
             "anterior inferior iliac spine",
             forward(15.0, -15.0),
             &|p| (p.y - radius_mm).min(0.65 * front.y - p.y).min(p.z),
-        )?,
+        ),
         // On the body of the pubic bone: a fifth of the pelvis' width on either side.
         pubic_tubercle: find("pubic tubercle", forward(20.0, -20.0), &|p| {
             (symphysis.x + 0.2 * width_mm - p.x).min(symphysis.y + 15.0 - p.y)
-        })?,
+        }),
         ischial_spine: find("ischial spine", forward(-10.0, 170.0), &|p| {
             (radius_mm - p.y.abs()).min(-p.z)
-        })?,
-    })
+        }),
+    }
 }
 
 /// The vertex farthest along `direction` among those for which `region`, the distance from the
-/// region's border (mm), is positive; `None` when it lies at the border.
+/// region's border (mm), is positive; `None` when it lies at the border. As good are those that
+/// reach nearly as far: a blunt spine is uncertain along its blunt end.
 fn extreme(
     hip: &Surface,
     local: &Local,
     direction: Vector,
     region: &dyn Fn(&Vector) -> f64,
-) -> Option<Point> {
-    let mut best: Option<(f64, f64, Point)> = None;
-    for point in hip.vertices() {
+) -> Option<Spot> {
+    let reaches = |point: &Point| {
         let p = local.coordinates(point);
         let inside = region(&p);
-        let reach = p.dot(&direction);
-        if inside > 0.0 && best.is_none_or(|(farthest, ..)| reach > farthest) {
+        (inside > 0.0).then(|| (p.dot(&direction), inside))
+    };
+    let mut best: Option<(f64, f64, Point)> = None;
+    for point in hip.vertices() {
+        if let Some((reach, inside)) = reaches(point)
+            && best.is_none_or(|(farthest, ..)| reach > farthest)
+        {
             best = Some((reach, inside, *point));
         }
     }
-    best.filter(|&(_, inside, _)| inside > BORDER_MM)
-        .map(|(.., point)| point)
+    let (farthest, _, point) = best.filter(|&(_, inside, _)| inside > BORDER_MM)?;
+    let as_far = |p: &&Point| reaches(p).is_some_and(|(reach, _)| reach >= farthest - FLAT_MM);
+    Some(Spot::among(point, hip.vertices().iter().filter(as_far)))
 }

@@ -1,14 +1,19 @@
 //! The acetabular rim.
 
 use super::closed_curve::{length, resampled, smoothed};
+use super::landmarks::LOST_MM;
 use super::{DetectError, Head, local::Local};
-use crate::anatomy::Side;
+use crate::anatomy::{Provenance, Rim, Side};
 use crate::geometry::{Point, Ray, Vector};
 use crate::volume::Surface;
 use nalgebra::Vector2;
+use std::ops::RangeInclusive;
 
 /// Meridians around the socket's axis.
 const MERIDIANS: usize = 180;
+
+/// The lower third, in which the acetabular notch lies: meridian 0 points up.
+const LOWER: RangeInclusive<usize> = MERIDIANS / 3..=2 * MERIDIANS / 3;
 
 /// Each meridian is searched between these angles from the socket's axis (deg); rims lie at 60 to
 /// 105.
@@ -25,6 +30,11 @@ const SOCKET_MM: f64 = 8.0;
 /// Bone within this distance beyond the head gives the socket's axis (mm).
 const AXIS_MM: f64 = 6.0;
 
+/// How far the eye moves (mm) and the socket's reach changes (mm) for the uncertainty: the sphere's
+/// residual, at most, and as much as joint spaces differ.
+const EYE_MM: f64 = 1.0;
+const REACH_MM: f64 = 2.0;
+
 /// Smoothing along the rim (deg of meridian): about 2 mm.
 const SMOOTHING_DEG: f64 = 4.0;
 
@@ -37,11 +47,49 @@ const STEP_MM: f64 = 2.5;
 ///
 /// `local` has its origin at the head's centre. The trace starts superiorly and runs by the front
 /// on either side; points are at most 3 mm apart.
+///
+/// The uncertainty is the root mean square over the trace's points of how far it moves when the
+/// head's centre, from which it is seen, moves [`EYE_MM`] along each axis, and the socket's reach
+/// grows or shrinks by [`REACH_MM`]: a sharp edge stays where it is.
 pub(super) fn rim(
     hip: &Surface,
     side: Side,
     local: &Local,
     head: &Head,
+) -> Result<Rim, DetectError> {
+    let points = trace(hip, side, local, head, SOCKET_MM)?;
+    let moved = |by: Vector, reach_mm: f64| {
+        let mut other = *head;
+        other.center += local.direction(&by);
+        let seen = trace(hip, side, local, &other, SOCKET_MM + reach_mm);
+        seen.map_or(LOST_MM * LOST_MM, |seen| apart(&points, &seen))
+    };
+    let axes = [Vector::x(), Vector::y(), Vector::z()].map(|v| v * EYE_MM);
+    let pairs = axes
+        .map(|by| moved(by, 0.0) + moved(-by, 0.0))
+        .into_iter()
+        .sum::<f64>()
+        + moved(Vector::zeros(), REACH_MM)
+        + moved(Vector::zeros(), -REACH_MM);
+    Ok(Rim::new(points, Provenance::detected((pairs / 2.0).sqrt())))
+}
+
+/// Mean square distance of points from a closed line's vertices, which are dense.
+fn apart(points: &[Point], line: &[Point]) -> f64 {
+    let nearest = |p: &Point| {
+        line.iter()
+            .map(|q| (q - p).norm_squared())
+            .fold(f64::MAX, f64::min)
+    };
+    points.iter().map(nearest).sum::<f64>() / points.len().max(1) as f64
+}
+
+fn trace(
+    hip: &Surface,
+    side: Side,
+    local: &Local,
+    head: &Head,
+    socket_mm: f64,
 ) -> Result<Vec<Point>, DetectError> {
     let not_found = |reason: String| DetectError::NotFound {
         what: "acetabular rim",
@@ -50,11 +98,14 @@ pub(super) fn rim(
     };
     let axis = socket_axis(hip, head)
         .ok_or_else(|| not_found("no bone lies close around the femoral head".into()))?;
-    let fan = Fan::new(hip, head, axis, local)
+    let fan = Fan::new(hip, head, axis, local, socket_mm)
         .ok_or_else(|| not_found("the socket's axis points straight up or down".into()))?;
     let mut edge = Vec::with_capacity(MERIDIANS);
     for meridian in 0..MERIDIANS {
-        edge.push(fan.edge(meridian).ok_or_else(|| {
+        // A meridian through a wide notch may meet no socket at all. It will be bridged, as all of the
+        // notch is.
+        let notch = LOWER.contains(&meridian).then(|| fan.inmost());
+        edge.push(fan.edge(meridian).or(notch).ok_or_else(|| {
             not_found(format!(
                 "no socket lies {} deg round from superior",
                 2 * meridian
@@ -104,7 +155,13 @@ struct Fan<'a> {
 }
 
 impl<'a> Fan<'a> {
-    fn new(hip: &'a Surface, head: &Head, axis: Vector, local: &Local) -> Option<Self> {
+    fn new(
+        hip: &'a Surface,
+        head: &Head,
+        axis: Vector,
+        local: &Local,
+        socket_mm: f64,
+    ) -> Option<Self> {
         let up = local.axes[1];
         let superior = (up - axis * up.dot(&axis)).try_normalize(0.1)?;
         let sideways = axis.cross(&superior);
@@ -112,7 +169,7 @@ impl<'a> Fan<'a> {
         Some(Self {
             hip,
             center: head.center,
-            reach_mm: head.radius_mm + SOCKET_MM,
+            reach_mm: head.radius_mm + socket_mm,
             axes: [axis, superior, anterior],
         })
     }
@@ -153,6 +210,11 @@ impl<'a> Fan<'a> {
         self.socket(m, seen).map(|d| Vector2::new(seen, d))
     }
 
+    /// Where the search of a meridian ends in the socket, if there is none.
+    fn inmost(&self) -> Vector2<f64> {
+        Vector2::new(SEARCH_DEG.0, self.reach_mm)
+    }
+
     fn point(&self, meridian: usize, edge: &Vector2<f64>) -> Point {
         self.center + self.direction(meridian as f64, edge.x) * edge.y
     }
@@ -176,9 +238,9 @@ fn without_outliers(edge: &[Vector2<f64>]) -> Vec<Vector2<f64>> {
 fn bridged(fan: &Fan, edge: &[Vector2<f64>]) -> Vec<Point> {
     let n = edge.len();
     let points: Vec<Point> = (0..n).map(|m| fan.point(m, &edge[m])).collect();
-    // Meridian n / 2 points down. The notch is the edge's deepest gap in the lower third; a horn
-    // ends on either side of it, within a fifth of the circle.
-    let notch = (n / 3..=2 * n / 3)
+    // The notch is the edge's deepest gap in the lower third; a horn ends on either side of it, within
+    // a fifth of the circle.
+    let notch = LOWER
         .min_by(|&a, &b| edge[a].x.total_cmp(&edge[b].x))
         .unwrap_or(n / 2);
     let tip = |range: &mut dyn Iterator<Item = usize>| {

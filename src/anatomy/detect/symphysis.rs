@@ -1,5 +1,6 @@
 //! The pubic symphysis.
 
+use super::spot::{FLAT_MM, Spot};
 use super::{BoneSurfaces, DetectError, pelvic_frame::PelvicFrame};
 use crate::anatomy::Side;
 use crate::geometry::{Point, Vector};
@@ -17,23 +18,12 @@ const NEAR_MM: f64 = 40.0;
 /// The ends of one pubic bone's symphyseal face, in the world (LPS, mm).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FaceEnds {
-    pub superior: Point,
-    pub inferior: Point,
+    pub superior: Spot,
+    pub inferior: Spot,
 }
 
-/// The upper and lower end of each symphyseal face along its long axis, by [`Side::index`].
-pub(super) fn symphysis(
-    bones: &BoneSurfaces,
-    frame: &PelvicFrame,
-) -> Result<[FaceEnds; 2], DetectError> {
-    let mut ends = Vec::new();
-    for side in Side::BOTH {
-        ends.push(face_ends(bones, frame, side)?);
-    }
-    Ok([ends[0], ends[1]])
-}
-
-fn face_ends(
+/// The upper and lower end of one symphyseal face along its long axis.
+pub(super) fn face_ends(
     bones: &BoneSurfaces,
     frame: &PelvicFrame,
     side: Side,
@@ -82,12 +72,19 @@ fn face_ends(
     let angle = 0.5 * (2.0 * yz).atan2(yy - zz);
     let axis = Vector::new(0.0, angle.cos(), angle.sin());
     let reach = |p: &Vector| (p - mean).dot(&axis);
-    let by_reach = |a: &&Vector, b: &&Vector| reach(a).total_cmp(&reach(b));
-    let end = |p: Option<&Vector>| p.map(|p| local.point(p));
-    match (
-        end(face.iter().max_by(by_reach)),
-        end(face.iter().min_by(by_reach)),
-    ) {
+    let end = |sign: f64| -> Option<Spot> {
+        let farthest = |p: &&Vector| sign * reach(p);
+        let best = face
+            .iter()
+            .max_by(|a, b| farthest(a).total_cmp(&farthest(b)))?;
+        let as_far: Vec<Point> = face
+            .iter()
+            .filter(|p| farthest(p) >= farthest(&best) - FLAT_MM)
+            .map(|p| local.point(p))
+            .collect();
+        Some(Spot::among(local.point(best), as_far.iter()))
+    };
+    match (end(1.0), end(-1.0)) {
         (Some(superior), Some(inferior)) => Ok(FaceEnds { superior, inferior }),
         _ => Err(not_found("its face is empty".into())),
     }

@@ -8,6 +8,9 @@
 //! | `landmarks.csv` | `name,x_lps_mm,y_lps_mm,z_lps_mm`, a row for each landmark and side (`ASIS_l`) |
 //! | `rims.csv` | `side,x_lps_mm,y_lps_mm,z_lps_mm`, each rim's points in their order round the rim |
 //!
+//! Both tables may go on with `found,uncertainty_mm`: detected, given or picked, and a standard
+//! deviation in mm ([`Provenance`](super::Provenance)).
+//!
 //! Points are in the world of the CT: LPS (x to the patient's left, y posterior, z superior), mm.
 //! Lines that start with `#` are comments.
 

@@ -1,6 +1,6 @@
 //! `landmarks.csv` and `rims.csv`.
 
-use crate::anatomy::{Landmark, Landmarks, Side};
+use crate::anatomy::{Found, Landmark, Landmarks, Provenance, Rim, Side};
 use crate::geometry::Point;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::collections::BTreeMap;
@@ -15,6 +15,11 @@ struct LandmarkRow {
     x_lps_mm: f64,
     y_lps_mm: f64,
     z_lps_mm: f64,
+    /// Files of before this column leave it and the next out.
+    #[serde(default)]
+    found: Option<Found>,
+    #[serde(default)]
+    uncertainty_mm: Option<f64>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -24,6 +29,11 @@ struct RimRow {
     x_lps_mm: f64,
     y_lps_mm: f64,
     z_lps_mm: f64,
+    /// Files of before this column leave it and the next out.
+    #[serde(default)]
+    found: Option<Found>,
+    #[serde(default)]
+    uncertainty_mm: Option<f64>,
 }
 
 /// Every row that parses, and a line for each that does not.
@@ -61,11 +71,16 @@ fn text<T: Serialize>(rows: impl Iterator<Item = T>) -> String {
 }
 
 pub(super) fn landmarks_text(landmarks: &Landmarks) -> String {
-    text(landmarks.iter().map(|(landmark, side, p)| LandmarkRow {
-        name: landmark.key(side),
-        x_lps_mm: p.x,
-        y_lps_mm: p.y,
-        z_lps_mm: p.z,
+    text(landmarks.iter().map(|(landmark, side, p)| {
+        let from = landmarks.provenance(landmark, side).unwrap_or_default();
+        LandmarkRow {
+            name: landmark.key(side),
+            x_lps_mm: p.x,
+            y_lps_mm: p.y,
+            z_lps_mm: p.z,
+            found: from.found,
+            uncertainty_mm: from.uncertainty_mm,
+        }
     }))
 }
 
@@ -91,31 +106,56 @@ pub(super) fn parse_landmarks(text: &str) -> (Landmarks, Vec<String>) {
         if landmarks.get(landmark, side).is_some() {
             bad.push(format!("line {line}: {} is there twice", row.name));
         }
-        landmarks.set(
-            landmark,
-            side,
-            Point::new(row.x_lps_mm, row.y_lps_mm, row.z_lps_mm),
-        );
+        let from = provenance(line, row.found, row.uncertainty_mm, &mut bad);
+        let point = Point::new(row.x_lps_mm, row.y_lps_mm, row.z_lps_mm);
+        landmarks.set_with(landmark, side, point, from);
     }
     (landmarks, bad)
 }
 
-pub(super) fn rims_text(rims: &[Vec<Point>; 2]) -> String {
+/// A row's provenance; an uncertainty that is none is named in `bad`.
+fn provenance(
+    line: u64,
+    found: Option<Found>,
+    uncertainty_mm: Option<f64>,
+    bad: &mut Vec<String>,
+) -> Provenance {
+    if let Some(mm) = uncertainty_mm.filter(|mm| !(mm.is_finite() && *mm >= 0.0)) {
+        bad.push(format!(
+            "line {line}: uncertainty_mm is {mm}; expected a length in mm, or nothing where it is not known"
+        ));
+    }
+    Provenance {
+        found,
+        uncertainty_mm,
+    }
+}
+
+pub(super) fn rims_text(rims: &[Rim; 2]) -> String {
     text(Side::BOTH.into_iter().flat_map(|side| {
-        rims[side.index()].iter().map(move |p| RimRow {
+        let rim = &rims[side.index()];
+        rim.iter().map(move |p| RimRow {
             side,
             x_lps_mm: p.x,
             y_lps_mm: p.y,
             z_lps_mm: p.z,
+            found: rim.provenance.found,
+            uncertainty_mm: rim.provenance.uncertainty_mm,
         })
     }))
 }
 
-pub(super) fn parse_rims(text: &str) -> ([Vec<Point>; 2], Vec<String>) {
-    let (rows, bad) = rows::<RimRow>(text);
-    let mut rims = [Vec::new(), Vec::new()];
-    for (_, row) in rows {
-        rims[row.side.index()].push(Point::new(row.x_lps_mm, row.y_lps_mm, row.z_lps_mm));
+/// A rim is as its first row says: detected, given or picked as a whole.
+pub(super) fn parse_rims(text: &str) -> ([Rim; 2], Vec<String>) {
+    let (rows, mut bad) = rows::<RimRow>(text);
+    let mut rims = [Rim::default(), Rim::default()];
+    for (line, row) in rows {
+        let rim = &mut rims[row.side.index()];
+        let from = provenance(line, row.found, row.uncertainty_mm, &mut bad);
+        if rim.is_empty() {
+            rim.provenance = from;
+        }
+        rim.push(Point::new(row.x_lps_mm, row.y_lps_mm, row.z_lps_mm));
     }
     (rims, bad)
 }
@@ -132,6 +172,9 @@ mod tests {
             Side::Right,
             Point::new(-1.0 / 3.0, 1e-17, 1e9 + 0.1),
         );
+        let (left, point) = (Side::Left, Point::new(1.0, 2.0, 3.0));
+        landmarks.set_with(Landmark::Gsn, left, point, Provenance::detected(0.1 + 0.2));
+        landmarks.set_with(Landmark::Iof, left, point, Provenance::default());
         let written = landmarks_text(&landmarks);
         assert!(
             written.starts_with("# World of ct.nii.gz: LPS"),
@@ -139,8 +182,11 @@ mod tests {
         );
         assert_eq!(parse_landmarks(&written), (landmarks, vec![]));
         let rims = [
-            vec![Point::new(0.1, 0.2, 0.3), Point::new(4.0, 5.0, 6.0)],
-            vec![Point::new(-7.0, 8.0, 9.0)],
+            Rim::new(
+                vec![Point::new(0.1, 0.2, 0.3), Point::new(4.0, 5.0, 6.0)],
+                Provenance::detected(1.0 / 3.0),
+            ),
+            vec![Point::new(-7.0, 8.0, 9.0)].into(),
         ];
         assert_eq!(parse_rims(&rims_text(&rims)), (rims, vec![]));
     }
@@ -162,5 +208,31 @@ mod tests {
         assert!(bad[0].contains("middle"), "{bad:?}");
         // Columns of another frame are not taken for LPS.
         assert!(!parse_landmarks("name,x,y,z\nFH_l,1,2,3\n").1.is_empty());
+    }
+    #[test]
+    fn files_without_provenance_are_read_and_nonsense_in_it_is_named() {
+        let row = "name,x_lps_mm,y_lps_mm,z_lps_mm\nFH_l,1,2,3\n";
+        let (landmarks, bad) = parse_landmarks(row);
+        assert!(bad.is_empty(), "{bad:?}");
+        let from = landmarks.provenance(Landmark::Fh, Side::Left);
+        assert_eq!(from, Some(Provenance::default()));
+        let (rims, bad) = parse_rims("side,x_lps_mm,y_lps_mm,z_lps_mm\nleft,1,2,3\n");
+        assert!(bad.is_empty(), "{bad:?}");
+        assert_eq!(rims[0].provenance, Provenance::default());
+        let head = "name,x_lps_mm,y_lps_mm,z_lps_mm,found,uncertainty_mm\n";
+        let (landmarks, bad) = parse_landmarks(&format!("{head}FH_l,1,2,3,picked,\n"));
+        assert!(bad.is_empty(), "{bad:?}");
+        let from = landmarks.provenance(Landmark::Fh, Side::Left).unwrap();
+        assert_eq!(
+            (from.found, from.uncertainty_mm),
+            (Some(Found::Picked), None)
+        );
+        for (cells, part) in [
+            ("guessed,1", "guessed"),
+            ("given,-1", "uncertainty_mm is -1"),
+        ] {
+            let (_, bad) = parse_landmarks(&format!("{head}FH_l,1,2,3,{cells}\n"));
+            assert!(bad.join("").contains(part), "{cells}: {bad:?}");
+        }
     }
 }

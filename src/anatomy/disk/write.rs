@@ -118,7 +118,7 @@ mod tests {
             ct,
             labels,
             landmarks,
-            rims: [ring(1.0), ring(-1.0)],
+            rims: [ring(1.0).into(), ring(-1.0).into()],
         }
     }
 

@@ -1,13 +1,16 @@
 //! `pao-sim specimen check`: is a specimen what it says?
 
+use super::show::plan;
 use super::source::Source;
 use crate::cli::args::Common;
 use crate::cli::error::{Exit, Failure};
 use crate::cli::output::say;
 use pao_sim::anatomy::check::{Check, Verdict, check_specimen};
 use pao_sim::anatomy::{Hip, Side, Specimen, specimen_problems};
-use pao_sim::surgery::{FragmentParameters, NominalCutParameters, cut_fragment, nominal_cuts};
+use pao_sim::report::specimen::{HipPlan, Painting, check_sheet};
+use pao_sim::surgery::{CutPlanes, SurgeryMap};
 use serde_json::json;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Prove on a specimen's own data that its sides and frames are right, its landmarks on bone, its bones
@@ -16,35 +19,73 @@ use std::sync::Arc;
 pub struct Arguments {
     #[command(flatten)]
     source: Source,
+    /// Also draw everything on one page: radiograph, slices with labels, surfaces with landmarks, cuts and
+    /// rim, and this table. A picture that is there is replaced
+    #[arg(long, value_name = "FILE.png")]
+    sheet: Option<PathBuf>,
 }
 
 pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let specimen = Arc::new(arguments.source.specimen()?);
     let mut checks: Vec<Check> = specimen_problems(&specimen)
         .iter()
-        .map(|problem| Check::holds("specimen", false, problem.to_string(), "no problem"))
+        .map(|problem| {
+            Check::holds("specimen", false, problem.to_string(), "no problem")
+                .advise("a study refuses it; mend what is named")
+        })
         .collect();
     checks.extend(check_specimen(&specimen));
-    checks.extend(Side::BOTH.map(|side| surgery(&specimen, side)));
+    let hips: Vec<(Hip, Plan)> = Side::BOTH
+        .into_iter()
+        .filter_map(|side| Hip::new(specimen.clone(), side).ok())
+        .map(|hip| {
+            let plan = plan(&hip);
+            (hip, plan)
+        })
+        .collect();
+    checks.extend(hips.iter().map(|(hip, plan)| surgery(hip, plan)));
+    if let Some(file) = &arguments.sheet {
+        sheet(&specimen, &hips, &checks).write(file)?;
+    }
     print(&specimen, &checks, common);
+    if let Some(file) = &arguments.sheet
+        && !common.json
+    {
+        say!("{}", file.display());
+    }
     let wrong = checks.iter().any(|check| check.verdict == Verdict::Wrong);
     Ok(if wrong { Exit::Error } else { Exit::Complete })
 }
 
+type Plan = Result<(CutPlanes, SurgeryMap), String>;
+
 /// Whether the planned cuts of a hip free a fragment of a usual size.
-fn surgery(specimen: &Arc<Specimen>, side: Side) -> Check {
-    let what = format!("{side} fragment of the planned cuts");
-    let volume = || -> Result<f64, String> {
-        let hip = Hip::new(specimen.clone(), side).map_err(|e| e.to_string())?;
-        let cuts =
-            nominal_cuts(&hip, &NominalCutParameters::default()).map_err(|e| e.to_string())?;
-        let map = cut_fragment(&hip, &cuts, &FragmentParameters::default());
-        Ok(map.map_err(|e| e.to_string())?.fragment_cm3())
-    };
-    match volume() {
-        Ok(cm3) => Check::number(what, cm3, "cm3", (30.0, 130.0), (10.0, 250.0)),
-        Err(reason) => Check::holds(what, false, reason, "a fragment"),
+fn surgery(hip: &Hip, plan: &Plan) -> Check {
+    let what = format!("{} fragment of the planned cuts", hip.side);
+    match plan {
+        Ok((_, map)) => {
+            let cm3 = map.fragment_cm3();
+            Check::number(what, cm3, "cm3", (30.0, 130.0), (10.0, 250.0)).advise(
+                "the study's fragments vary about this one; look at the planned cuts in `specimen show`, and \
+                 set [surgery.nominal] if they are not where you would cut",
+            )
+        }
+        Err(reason) => Check::holds(what, false, reason, "a fragment").advise(
+            "a study on this hip would stop; look at the landmarks ASIS, AIIS, FH and at the rim, from which \
+             the cuts are planned",
+        ),
     }
+}
+
+fn sheet(specimen: &Specimen, hips: &[(Hip, Plan)], checks: &[Check]) -> Painting {
+    let hips: Vec<_> = hips
+        .iter()
+        .map(|(hip, plan)| {
+            let plan = plan.as_ref().ok();
+            (hip.clone(), plan.map(|(cuts, map)| HipPlan { cuts, map }))
+        })
+        .collect();
+    check_sheet(specimen, &hips, checks)
 }
 
 fn print(specimen: &Specimen, checks: &[Check], common: &Common) {
@@ -53,7 +94,7 @@ fn print(specimen: &Specimen, checks: &[Check], common: &Common) {
             say!(
                 "{}",
                 json!({"specimen": specimen.name, "check": check.what, "found": check.found,
-                    "expected": check.expected, "verdict": check.verdict.name()})
+                    "expected": check.expected, "verdict": check.verdict.name(), "advice": check.advice})
             );
         }
         return;
@@ -85,6 +126,14 @@ fn print(specimen: &Specimen, checks: &[Check], common: &Common) {
             check.found,
             check.expected,
             check.verdict.name()
+        );
+    }
+    for check in checks.iter().filter(|c| c.verdict != Verdict::Fine) {
+        say!(
+            "\n{} ({}): {}",
+            check.what,
+            check.verdict.name(),
+            check.advice
         );
     }
     let count = |verdict| checks.iter().filter(|c| c.verdict == verdict).count();

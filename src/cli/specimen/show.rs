@@ -62,7 +62,8 @@ fn picture(hip: &Hip) -> Painting {
     }
 }
 
-fn plan(hip: &Hip) -> Result<(CutPlanes, SurgeryMap), String> {
+/// The planned cuts of a hip and what they come to.
+pub fn plan(hip: &Hip) -> Result<(CutPlanes, SurgeryMap), String> {
     let cuts = nominal_cuts(hip, &NominalCutParameters::default()).map_err(|e| e.to_string())?;
     let map = cut_fragment(hip, &cuts, &FragmentParameters::default());
     Ok((cuts, map.map_err(|e| e.to_string())?))

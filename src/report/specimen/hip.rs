@@ -11,13 +11,13 @@ use crate::surgery::{Cut, CutPlanes, SurgeryMap};
 use crate::volume::{Surface, Volume};
 
 /// Colours of the cuts, in the order of [`Cut::ALL`].
-const CUTS: [Colour; 4] = [
+pub(super) const CUTS: [Colour; 4] = [
     [255, 90, 90],
     [90, 160, 255],
     [255, 230, 60],
     [200, 120, 255],
 ];
-const FRAGMENT: Colour = [240, 100, 190];
+pub(super) const FRAGMENT: Colour = [240, 100, 190];
 const CHISEL: Colour = [255, 230, 60];
 const BONE: Colour = [225, 215, 195];
 
@@ -93,9 +93,7 @@ fn slice(hip: &Hip, plan: Option<HipPlan>, view: &View) -> Painting {
         for x in 0..PANEL {
             let at = volume_from_app * view.point(x as f64, y as f64);
             let Some(hu) = ct.nearest(&at) else { continue };
-            let (low, high) = WINDOW;
-            let grey = (255.0 * ((f64::from(hu) - low) / (high - low)).clamp(0.0, 1.0)) as u8;
-            panel.set(x, y, [grey; 3]);
+            panel.set(x, y, grey(hu));
             let label = plan.and_then(|plan| plan.map.labels.nearest(&at));
             if label == Some(Label::Fragment.value()) {
                 panel.tint(x, y, FRAGMENT, 0.4);
@@ -105,21 +103,7 @@ fn slice(hip: &Hip, plan: Option<HipPlan>, view: &View) -> Painting {
         }
     }
     if let Some(plan) = plan {
-        for (cut, colour) in Cut::ALL.into_iter().zip(CUTS) {
-            let plane = plan.cuts.get(cut);
-            let (along, across) = (plane.normal.dot(&view.right), plane.normal.dot(&view.up));
-            let steepness = along.hypot(across);
-            // A plane that almost contains the slice has no line to speak of.
-            if steepness < 0.1 {
-                continue;
-            }
-            let distance = plane.signed_distance(&view.middle);
-            let foot = view.middle
-                - (view.right * along + view.up * across) * (distance / steepness.powi(2));
-            let direction = (view.right * -across + view.up * along) / steepness;
-            let ends = [-1.0, 1.0].map(|sign| view.pixel(&(foot + direction * (sign * 400.0))));
-            panel.line(ends, colour);
-        }
+        cut_lines(&mut panel, plan.cuts, view);
     }
     let toward = view.toward();
     let side = SIDES[hip.side.index()];
@@ -132,8 +116,33 @@ fn slice(hip: &Hip, plan: Option<HipPlan>, view: &View) -> Painting {
     panel
 }
 
+/// The grey of a Hounsfield value in a slice.
+pub(super) fn grey(hu: i16) -> Colour {
+    let (low, high) = WINDOW;
+    [(255.0 * ((f64::from(hu) - low) / (high - low)).clamp(0.0, 1.0)) as u8; 3]
+}
+
+/// Where the cuts' planes pass through the plane of a view.
+pub(super) fn cut_lines(panel: &mut Painting, cuts: &CutPlanes, view: &View) {
+    for (cut, colour) in Cut::ALL.into_iter().zip(CUTS) {
+        let plane = cuts.get(cut);
+        let (along, across) = (plane.normal.dot(&view.right), plane.normal.dot(&view.up));
+        let steepness = along.hypot(across);
+        // A plane that almost contains the slice has no line to speak of.
+        if steepness < 0.1 {
+            continue;
+        }
+        let distance = plane.signed_distance(&view.middle);
+        let foot =
+            view.middle - (view.right * along + view.up * across) * (distance / steepness.powi(2));
+        let direction = (view.right * -across + view.up * along) / steepness;
+        let ends = [-1.0, 1.0].map(|sign| view.pixel(&(foot + direction * (sign * 400.0))));
+        panel.line(ends, colour);
+    }
+}
+
 /// Pelvis and fragment in the APP, with their colours.
-fn surfaces(hip: &Hip, plan: Option<HipPlan>) -> Vec<(Surface, Colour)> {
+pub(super) fn surfaces(hip: &Hip, plan: Option<HipPlan>) -> Vec<(Surface, Colour)> {
     let labels: &Volume<u8> = match &plan {
         Some(plan) => &plan.map.labels,
         None => &hip.specimen.labels,
@@ -164,7 +173,8 @@ fn own_half(surface: &Surface, hip: &Hip) -> Surface {
     Surface::new(surface.vertices().to_vec(), triangles)
 }
 
-fn shaded(hip: &Hip, surfaces: &[(Surface, Colour)], view: &View) -> Painting {
+/// Surfaces with the hip's rim and landmarks.
+pub(super) fn shaded(hip: &Hip, surfaces: &[(Surface, Colour)], view: &View) -> Painting {
     let mut scene = Scene::new(*view);
     for (surface, colour) in surfaces {
         scene.add(surface, *colour);

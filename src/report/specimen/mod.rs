@@ -5,10 +5,12 @@ mod hip;
 mod painting;
 mod radiograph;
 mod shading;
+mod sheet;
 
 pub use hip::{HipPlan, hip_picture};
 pub use painting::Painting;
 pub use radiograph::ap_radiograph;
+pub use sheet::check_sheet;
 
 use super::picture::Colour;
 
