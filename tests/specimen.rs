@@ -3,7 +3,10 @@
 use assert_cmd::Command;
 use pao_sim::anatomy::landmark_files::read_landmark_overrides;
 use pao_sim::anatomy::surfaces::BONES;
-use pao_sim::anatomy::{PhantomParameters, Specimen, phantom, read_specimen, write_specimen};
+use pao_sim::anatomy::{
+    PhantomParameters, Specimen, phantom, phantom_structures, read_specimen, write_specimen,
+};
+use pao_sim::volume::write_nifti;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 use tempfile::TempDir;
@@ -382,4 +385,45 @@ fn a_real_subject_is_imported_and_proved() {
     assert_eq!(made.source.licence, "CC BY-NC-SA 4.0");
     let (table, _) = check(&out, 0);
     assert!(table.contains("0 wrong"), "{table}");
+}
+
+/// A CT and a label map in which both femora have one value.
+#[test]
+fn a_ct_with_a_label_map_is_imported_and_proved() {
+    let parameters = PhantomParameters {
+        voxel_mm: 2.0,
+        ..Default::default()
+    };
+    let (body, bones) = phantom_structures(1, &parameters);
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    write_nifti(&body.ct, &at("ct.nii.gz")).unwrap();
+    write_nifti(&bones.volume().map(|v| v.min(4)), &at("map.nii.gz")).unwrap();
+    let rows = "value,structure\n1,sacrum\n2,hip_left\n3,hip_right\n4,femora\n";
+    std::fs::write(at("table.csv"), rows).unwrap();
+    let import = |voxel_mm: &str, code: i32| {
+        let mut command = pao_sim();
+        command.args(["specimen", "import", "labels"]);
+        command.args([at("ct.nii.gz"), at("map.nii.gz")]);
+        command.arg("--table").arg(at("table.csv"));
+        command.arg("--out").arg(at("made"));
+        command.args(["--voxel-mm", voxel_mm, "--sex", "male", "--json"]);
+        said(&mut command, code)
+    };
+    let (_, refused) = import("9", 1);
+    assert!(refused.contains("voxel_mm is 9"), "{refused}");
+    assert!(!at("made").exists(), "nothing is half-written");
+    let (told, _) = import("2", 0);
+    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
+    assert_eq!(told["specimen"], "made");
+    assert_eq!(told["voxel_mm"], 2.0);
+    assert!(told["notes"].is_array());
+    let made = read_specimen(&at("made")).unwrap();
+    assert_eq!(made.source.kind, "labels");
+    assert_eq!(made.source.sex, "male");
+    assert!(!made.source.assigned_density);
+    assert!(made.ct == body.ct);
+    check(&at("made"), 0);
+    let (_, refused) = import("2", 1);
+    assert!(refused.contains("exists already"), "{refused}");
 }
