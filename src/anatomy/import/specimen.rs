@@ -7,7 +7,9 @@ use super::note::Note;
 use super::origin::CtOrigin;
 use super::parameters::CtImportParameters;
 use crate::anatomy::detect::{BoneSurfaces, detect};
-use crate::anatomy::{Landmark, Landmarks, Side, Source, Specimen, Structure, StructureLabels};
+use crate::anatomy::{
+    Landmark, Landmarks, Rim, Side, Source, Specimen, Structure, StructureLabels,
+};
 use crate::geometry::{Point, Vector};
 use crate::volume::resample::resample_labels;
 use crate::volume::{Grid, Volume};
@@ -154,7 +156,7 @@ fn check_sides(structures: &StructureLabels) -> Result<(), CtImportError> {
 
 struct Marks {
     landmarks: Landmarks,
-    rims: [Vec<Point>; 2],
+    rims: [Rim; 2],
     /// Names of those that were given.
     given: Vec<String>,
 }
@@ -191,8 +193,9 @@ fn marks(
         all.set(landmark, side, point);
     }
     let [left, right] = found;
-    let rim = |side: Side, found: Option<Vec<Point>>| {
-        rims[side.index()].clone().or(found).unwrap_or_default()
+    let rim = |side: Side, found: Option<Rim>| {
+        let given = rims[side.index()].clone().map(Rim::from);
+        given.or(found).unwrap_or_default()
     };
     Ok(Marks {
         landmarks: all,

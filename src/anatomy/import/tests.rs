@@ -95,7 +95,7 @@ fn what_is_on_the_grid_passes_bit_for_bit() {
     let left = Landmark::Asis;
     let point = body.landmarks.get(left, Side::Left).unwrap();
     import.landmarks.set(left, Side::Left, point);
-    import.rims[1] = Some(body.rims[1].clone());
+    import.rims[1] = Some(body.rims[1].to_vec());
     let with = specimen_from_ct(import, &parameters()).unwrap();
     assert_eq!(with.specimen.landmarks.get(left, Side::Left), Some(point));
     assert_eq!(
@@ -142,7 +142,7 @@ fn without_detection_everything_must_be_given() {
         "{message}"
     );
     import.landmarks = body.landmarks.clone();
-    import.rims = body.rims.clone().map(Some);
+    import.rims = body.rims.clone().map(|rim| Some(rim.to_vec()));
     let with = specimen_from_ct(import, &parameters()).unwrap();
     assert_eq!(with.specimen.landmarks, body.landmarks);
     assert_eq!(with.specimen.rims, body.rims);
