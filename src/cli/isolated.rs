@@ -66,7 +66,7 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let folder = StudyFolder::find(&arguments.study, &common.results)?;
     let attempts = folder.store().attempts().map_err(StudyError::Store)?;
     pao_sim::study::snapshot::select_simd(&attempts)?;
-    let config = Config::read_kept(&folder.config_file())?;
+    let config = Config::read_as_named(&folder.config_file())?;
     let stop = Stop::new(None);
     let options = RunOptions {
         threads: arguments.threads.max(1),

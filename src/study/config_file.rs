@@ -22,16 +22,16 @@ impl Config {
     /// When the file cannot be read, or with all its mistakes: syntax, unknown keys, wrong types,
     /// values out of range, variables that are not set, folders without a specimen.
     pub fn read(file: &Path) -> Result<Self, ConfigError> {
-        let environment = |name: &str| std::env::var(name).ok();
-        Self::parse_with(&text_of(file)?, file, &environment, Folders::Searched)
+        Self::parse_with(&text_of(file)?, file, &variable, Folders::Searched)
     }
 
-    /// Reads the configuration that a study's folder keeps: its specimens are named, and are not looked for.
+    /// The same without a look for specimens: for the configuration that a study's folder keeps, which names
+    /// them, and where other keys are wanted and the specimens may not be there.
     ///
     /// # Errors
-    /// As [`Self::read`].
-    pub fn read_kept(file: &Path) -> Result<Self, ConfigError> {
-        Self::parse(&text_of(file)?, file, &|_| None)
+    /// As [`Self::read`], but for folders.
+    pub fn read_as_named(file: &Path) -> Result<Self, ConfigError> {
+        Self::parse(&text_of(file)?, file, &variable)
     }
 
     /// The same for a text; `file` gives messages, the study's default name, and the folder that
@@ -96,6 +96,10 @@ impl Config {
 enum Folders {
     AsNamed,
     Searched,
+}
+
+fn variable(name: &str) -> Option<String> {
+    std::env::var(name).ok()
 }
 
 fn text_of(file: &Path) -> Result<String, ConfigError> {
@@ -444,7 +448,7 @@ photons = 3
         // What the study keeps needs no data.
         std::fs::write(&file, config.to_toml()).unwrap();
         std::fs::remove_file(folder.path().join("people/a/specimen.toml")).unwrap();
-        assert_eq!(Config::read_kept(&file).unwrap(), config);
+        assert_eq!(Config::read_as_named(&file).unwrap(), config);
     }
 
     #[test]

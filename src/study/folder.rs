@@ -132,7 +132,7 @@ impl StudyFolder {
                 path: study.to_owned(),
             });
         }
-        let name = Config::read(study)?.study.name;
+        let name = Config::read_as_named(study)?.study.name;
         let folder = Self::of(results, &name);
         if folder.config_file().is_file() {
             Ok(folder)

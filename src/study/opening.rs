@@ -125,7 +125,7 @@ pub(super) fn stored_config(folder: &StudyFolder) -> Result<Option<Config>, Stud
     if !file.is_file() {
         return Ok(None);
     }
-    Ok(Some(Config::read_kept(&file)?))
+    Ok(Some(Config::read_as_named(&file)?))
 }
 
 /// Refuses a share of which a living attempt has a part.

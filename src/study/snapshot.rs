@@ -24,7 +24,7 @@ impl Snapshot {
     /// # Errors
     /// When its configuration or journals cannot be read.
     pub fn read(folder: StudyFolder) -> Result<Self, StudyError> {
-        let config = Config::read_kept(&folder.config_file())?;
+        let config = Config::read_as_named(&folder.config_file())?;
         let state = State::of(folder.store().read()?)?;
         Ok(Self {
             plan: Plan::of(&config),

@@ -29,7 +29,7 @@ impl Bodies {
     /// The configuration's population, or the default one.
     pub fn population(&self) -> Result<PopulationSection, Failure> {
         Ok(match &self.config {
-            Some(file) => Config::read(file)?.population,
+            Some(file) => Config::read_as_named(file)?.population,
             None => PopulationSection::default(),
         })
     }
