@@ -98,6 +98,33 @@ fn refused_import(surfaces: &Path) -> String {
     said
 }
 
+/// From the header: eight bytes of signature, then the length and name of the first chunk.
+fn size_of_png(bytes: &[u8]) -> (u32, u32) {
+    assert_eq!(bytes[1..4], *b"PNG");
+    let number = |at: usize| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap());
+    (number(16), number(20))
+}
+
+#[test]
+fn advice_follows_the_table_for_what_is_not_ok_and_nothing_else() {
+    let (_folder, path) = written();
+    let (table, _) = check(&path, 0);
+    // Voxels of 3 mm are coarse.
+    assert!(
+        table.contains("largest edge of a voxel (doubtful): DRRs and cuts"),
+        "{table}"
+    );
+    assert!(!table.contains("(ok)"), "{table}");
+    let (lines, _) = said(
+        pao_sim().args(["specimen", "check", "--json"]).arg(&path),
+        0,
+    );
+    for line in lines.lines() {
+        let check: serde_json::Value = serde_json::from_str(line).unwrap();
+        assert!(!check["advice"].as_str().unwrap().is_empty(), "{line}");
+    }
+}
+
 #[test]
 fn a_written_body_is_read_again_as_it_was() {
     let (_folder, path) = written();
@@ -121,6 +148,18 @@ fn a_sound_body_is_proved_and_drawn() {
     ] {
         assert!(table.contains(line), "expected '{line}' in {table}");
     }
+    let sheet = folder.path().join("sheet.png");
+    let (told, _) = said(
+        pao_sim()
+            .args(["specimen", "check"])
+            .arg(&path)
+            .arg("--sheet")
+            .arg(&sheet),
+        0,
+    );
+    assert!(told.contains("sheet.png"), "{told}");
+    let (width, height) = size_of_png(&std::fs::read(&sheet).unwrap());
+    assert!(width > 2000 && height > 1000, "{width} x {height}");
     let pictures = folder.path().join("pictures");
     let (_, errors) = said(
         pao_sim()

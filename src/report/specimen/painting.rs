@@ -94,11 +94,17 @@ impl Painting {
         }
     }
 
-    /// Writes words to the right of and below a position.
+    /// Writes words to the right of and below a position, with a black border that sets them off from
+    /// what is bright.
     pub fn words(&mut self, at: &Pixel, text: &str, size: u32, colour: Colour) {
         register_letters();
-        let style = ("sans-serif", size).into_font().color(&rgb(colour));
-        self.draw(|area| area.draw(&Text::new(text.to_owned(), place(*at), style)));
+        let (x, y) = place(*at);
+        let around = [(-1, 0), (1, 0), (0, -1), (0, 1)].map(|by| (by, [0; 3]));
+        for ((right, down), colour) in around.into_iter().chain([((0, 0), colour)]) {
+            let style = ("sans-serif", size).into_font().color(&rgb(colour));
+            let words = Text::new(text.to_owned(), (x + right, y + down), style);
+            self.draw(|area| area.draw(&words));
+        }
     }
 
     /// Copies another picture to where its first pixel lies at (`x`, `y`).

@@ -43,8 +43,18 @@ pub fn ap_radiograph(specimen: &Specimen, attenuation: &AttenuationParameters) -
         let at = camera.project(&(pose * point));
         let colour = SIDES[side.index()];
         painting.cross(&at, 5, colour);
-        let words = at + nalgebra::Vector2::new(6.0, -14.0);
-        painting.words(&words, &landmark.key(side), 13, colour);
+        // Away from the midline, where left and right landmarks lie beside each other.
+        let key = landmark.key(side);
+        let beside = match side {
+            Side::Left => 6.0,
+            Side::Right => -8.5 * key.len() as f64 - 4.0,
+        };
+        painting.words(
+            &(at + nalgebra::Vector2::new(beside, -14.0)),
+            &key,
+            13,
+            colour,
+        );
     }
     let corner = |x: f64| crate::geometry::Pixel::new(x, 8.0);
     let source = &specimen.source;

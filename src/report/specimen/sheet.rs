@@ -25,9 +25,12 @@ const SURFACE_PIXEL_MM: f64 = 0.56;
 const TABLE: usize = 900;
 const ROW: usize = 17;
 const WORDS: u32 = 12;
-/// Where the table's columns begin, and how many letters fit in the first two.
+/// Where the table's columns begin, and how many letters fit in the first three.
 const COLUMNS: [f64; 4] = [10.0, 395.0, 620.0, 815.0];
 const FITTING: [usize; 3] = [58, 33, 28];
+
+/// Letters of a line of advice.
+const ADVICE: usize = 280;
 
 const WHITE: Colour = [255; 3];
 const DIM: Colour = [170; 3];
@@ -36,7 +39,7 @@ const PELVIS: Colour = [255, 220, 60];
 /// The sheet of a specimen and its checks. Above the radiograph as it is shown to people, the patient's
 /// left on the right, and below it slices through the femoral heads with the labels' outlines (axial from
 /// the feet, coronal from the front, sagittal from the left through the left head), then each hip's
-/// surface from the front and from within; at the side the table. A hip without a plan is drawn without
+/// surface from the front and from within; at the side the table and, below the pictures, what to do about what is not ok. A hip without a plan is drawn without
 /// cuts, one without a frame not at all.
 pub fn check_sheet(
     specimen: &Specimen,
@@ -45,8 +48,9 @@ pub fn check_sheet(
 ) -> Painting {
     let ap = ap_radiograph(specimen, &AttenuationParameters::default());
     let width = ap.width().max(3 * PANEL);
-    let pictures = (ap.height() + PANEL + 40).max(3 * PANEL);
-    let height = pictures.max(table_rows(checks) * ROW + 20);
+    let pictures = 3 * PANEL;
+    let said = advice(checks);
+    let height = (pictures + (said.len() + 1) * ROW).max((checks.len() + 5) * ROW);
     let mut sheet = Painting::new(width + 2 * PANEL + TABLE, height);
     sheet.paste(&ap, (width - ap.width()) / 2, 0);
     for (n, (view, name)) in slices(specimen).into_iter().enumerate() {
@@ -83,6 +87,10 @@ pub fn check_sheet(
             let column = width + PANEL * (1 - hip.side.index());
             sheet.paste(&panel, column, row * PANEL);
         }
+    }
+    for (n, (line, colour)) in said.iter().enumerate() {
+        let at = Pixel::new(8.0, (pictures + n * ROW) as f64 + 8.0);
+        sheet.words(&at, line, WORDS, *colour);
     }
     table(&mut sheet, width + 2 * PANEL, specimen, checks);
     sheet
@@ -198,35 +206,28 @@ fn legend(sheet: &mut Painting, top: usize) {
     word("fragment", FRAGMENT);
 }
 
-/// Rows of the table: title, head, checks, blank, count, and advice.
-fn table_rows(checks: &[Check]) -> usize {
-    let advice: usize = bad(checks).map(|check| advice(check).len() + 1).sum();
-    checks.len() + advice + 6
-}
-
-fn bad(checks: &[Check]) -> impl Iterator<Item = &Check> {
-    checks.iter().filter(|check| check.verdict != Verdict::Fine)
-}
-
-/// A check's name and advice in lines that fit.
-fn advice(check: &Check) -> Vec<String> {
-    let text = format!(
-        "{} ({}): {}",
-        check.what,
-        check.verdict.name(),
-        check.advice
-    );
-    let mut lines = vec![String::new()];
-    for word in text.split(' ') {
-        let last = lines.last_mut().expect("there is a line");
-        if last.chars().count() + word.chars().count() > 128 {
-            lines.push(format!("    {word}"));
-        } else {
-            if !last.is_empty() {
-                last.push(' ');
+/// What to say about checks that are not fine, in lines that fit below the pictures.
+fn advice(checks: &[Check]) -> Vec<(String, Colour)> {
+    let mut lines: Vec<(String, Colour)> = Vec::new();
+    for check in checks.iter().filter(|c| c.verdict != Verdict::Fine) {
+        let text = format!(
+            "{} ({}): {}",
+            check.what,
+            check.verdict.name(),
+            check.advice
+        );
+        let mut line = String::new();
+        for word in text.split(' ') {
+            if line.chars().count() + word.chars().count() > ADVICE {
+                lines.push((line, shade(check.verdict)));
+                line = "   ".into();
             }
-            last.push_str(word);
+            if !line.is_empty() {
+                line.push(' ');
+            }
+            line.push_str(word);
         }
+        lines.push((line, shade(check.verdict)));
     }
     lines
 }
@@ -268,12 +269,6 @@ fn table(sheet: &mut Painting, left: usize, specimen: &Specimen, checks: &[Check
         row(&cells, shade(check.verdict));
     }
     row(&[], WHITE);
-    for check in bad(checks) {
-        for line in advice(check) {
-            row(&[(0, &line)], shade(check.verdict));
-        }
-        row(&[], WHITE);
-    }
     let count = |verdict| checks.iter().filter(|c| c.verdict == verdict).count();
     let counts = format!(
         "{} checks: {} ok, {} doubtful, {} wrong",
