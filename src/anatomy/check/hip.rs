@@ -168,6 +168,10 @@ fn rim_checks(hip: &Hip, pelvis: &Surface, head_mm: f64) -> Vec<Check> {
     let name = |what: &str| format!("{side} rim{what}");
     let advice = "cuts keep their distance from the rim, and the LCE angle is read from it: both follow a wrong rim; \
                   trace it anew, or leave it out to have it found";
+    let over = radius / head_mm;
+    let what = name("'s mean radius over the head's");
+    let mut proportion = Check::number(what, over, "", (0.95, 1.35), (0.8, 1.6));
+    proportion.found = format!("{over:.2}");
     let checks = vec![
         Check::number(name(" on bone"), share, "%", (70.0, 100.0), (40.0, 100.0)),
         Check::number(
@@ -177,13 +181,7 @@ fn rim_checks(hip: &Hip, pelvis: &Surface, head_mm: f64) -> Vec<Check> {
             (20.0, 38.0),
             (15.0, 45.0),
         ),
-        Check::number(
-            name("'s mean radius over the head's"),
-            radius / head_mm,
-            "",
-            (0.95, 1.35),
-            (0.8, 1.6),
-        ),
+        proportion,
         Check::number(
             name("'s distance from its plane (RMS)"),
             rms,
@@ -212,18 +210,20 @@ fn rim_checks(hip: &Hip, pelvis: &Surface, head_mm: f64) -> Vec<Check> {
             (15.0, 70.0),
             (0.0, 80.0),
         ),
-        Check::number(
-            format!("{side} LCE angle"),
-            lce,
-            "deg",
-            (10.0, 50.0),
-            (-20.0, 70.0),
-        ),
     ];
-    checks
-        .into_iter()
-        .map(|check| check.advise(advice))
-        .collect()
+    let lce = Check::number(
+        format!("{side} LCE angle"),
+        lce,
+        "deg",
+        (10.0, 50.0),
+        (-20.0, 70.0),
+    )
+    .advise(
+        "a hip that is covered so little or so much is not what the operation was described for, and its \
+         movements collide earlier or later; or the rim's lateral edge is wrong: look at it in the pictures",
+    );
+    let checks = checks.into_iter().map(|check| check.advise(advice));
+    checks.chain([lce]).collect()
 }
 
 /// Middle, unit normal (on the side of `lateral`) and RMS distance of the best plane.

@@ -19,7 +19,7 @@ const PANEL: usize = 430;
 
 /// A slice shows the whole body, a surface one hip.
 const SLICE_PIXEL_MM: f64 = 1.0;
-const SURFACE_PIXEL_MM: f64 = 0.56;
+const SURFACE_PIXEL_MM: f64 = 0.62;
 
 /// Columns of the table of checks.
 const TABLE: usize = 900;
@@ -48,9 +48,9 @@ pub fn check_sheet(
 ) -> Painting {
     let ap = ap_radiograph(specimen, &AttenuationParameters::default());
     let width = ap.width().max(3 * PANEL);
-    let pictures = 3 * PANEL;
+    let below = 3 * PANEL + 2 * ROW;
     let said = advice(checks);
-    let height = (pictures + (said.len() + 1) * ROW).max((checks.len() + 5) * ROW);
+    let height = (below + (said.len() + 1) * ROW).max((checks.len() + 5) * ROW);
     let mut sheet = Painting::new(width + 2 * PANEL + TABLE, height);
     sheet.paste(&ap, (width - ap.width()) / 2, 0);
     for (n, (view, name)) in slices(specimen).into_iter().enumerate() {
@@ -89,7 +89,7 @@ pub fn check_sheet(
         }
     }
     for (n, (line, colour)) in said.iter().enumerate() {
-        let at = Pixel::new(8.0, (pictures + n * ROW) as f64 + 8.0);
+        let at = Pixel::new(8.0, (below + n * ROW) as f64);
         sheet.words(&at, line, WORDS, *colour);
     }
     table(&mut sheet, width + 2 * PANEL, specimen, checks);
