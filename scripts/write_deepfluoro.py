@@ -26,7 +26,7 @@ def image(group, pixels, spacing, origin, directions, shuffle=False):
     rows = max(1, 2**20 // (pixels.itemsize * pixels.shape[1] * pixels.shape[2]))
     chunks = (min(rows, pixels.shape[0]),) + pixels.shape[1:]
     group.create_dataset("pixels", data=pixels, chunks=chunks, compression="gzip",
-                         compression_opts=9, shuffle=shuffle)
+                         compression_opts=4, shuffle=shuffle)
     group.create_dataset("spacing", data=np.reshape(spacing, (3, 1)).astype("f8"))
     group.create_dataset("origin", data=np.reshape(origin, (3, 1)).astype("f8"))
     group.create_dataset("dir-mat", data=np.asarray(directions, "f8"))

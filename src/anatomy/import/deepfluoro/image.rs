@@ -99,7 +99,47 @@ fn dims(source: &Source, name: &str, pixels: &Dataset) -> Result<[usize; 3], CtI
     if shape.iter().any(|&n| n < 2) || !possible {
         return Err(bad());
     }
+    check_storage(source, name, pixels, &shape, element)?;
     Ok([columns as usize, rows as usize, slices as usize])
+}
+
+/// Chunks are read and decompressed as a whole, and values of those that are not stored are made up: so all
+/// must be stored, in the file, and none be larger than the dataset or than its bytes can hold.
+fn check_storage(
+    source: &Source,
+    name: &str,
+    data: &Dataset,
+    shape: &[u64],
+    element: u64,
+) -> Result<(), CtImportError> {
+    let bytes_of = |shape: &[u64]| {
+        let count = shape.iter().try_fold(element, |n, &d| n.checked_mul(d));
+        count.unwrap_or(u64::MAX)
+    };
+    let fits = |stored: u64, bytes: u64| stored.saturating_mul(MOST_BYTES_PER_BYTE) >= bytes;
+    let possible = match source.parts(data.chunk_shape(), name)? {
+        None => bytes_of(shape) <= source.bytes(),
+        Some(chunk) => {
+            let within = chunk.len() == shape.len() && chunk.iter().zip(shape).all(|(c, n)| c <= n);
+            let bytes = bytes_of(&chunk);
+            let chunks = match within {
+                true => source.parts(data.chunks(), name)?,
+                false => Vec::new(),
+            };
+            let stored = |c: &hdf5_pure::Chunk| {
+                let end = c.address.saturating_add(c.storage_size);
+                end <= source.bytes() && fits(c.storage_size, bytes)
+            };
+            let enough = bytes.saturating_mul(chunks.len() as u64) >= bytes_of(shape);
+            within && enough && chunks.iter().all(stored)
+        }
+    };
+    match possible {
+        true => Ok(()),
+        false => Err(source.problem(format!(
+            "{name} claims {shape:?} values that the file does not hold; copy it again"
+        ))),
+    }
 }
 
 /// A dataset of `count` numbers in whatever shape: vectors are columns of a matrix here.
@@ -111,8 +151,12 @@ pub(super) fn read_numbers(
 ) -> Result<Vec<f64>, CtImportError> {
     let shape = source.parts(data.shape(), name)?;
     let found = shape.iter().try_fold(1u64, |n, &d| n.checked_mul(d));
-    let numbers = match found == Some(count as u64) {
-        true => source.parts(data.read_f64(), name)?,
+    let element = source.parts(data.element_size(), name)?;
+    let numbers = match found == Some(count as u64) && element <= 8 {
+        true => {
+            check_storage(source, name, data, &shape, element)?;
+            source.parts(data.read_f64(), name)?
+        }
         false => Vec::new(),
     };
     if numbers.len() != count || !numbers.iter().all(|v| v.is_finite()) {

@@ -4,7 +4,7 @@ use super::contents::Source;
 use crate::anatomy::import::{CtImportError, LabelMeaning, Note};
 use crate::anatomy::{Side, Structure, StructureLabels};
 use crate::volume::Volume;
-use hdf5_pure::Group;
+use hdf5_pure::{DType, Group, VlenStringReadOptions};
 
 /// The data set's labels; 3 is vertebrae. The sacrum is in two parts, the lower one in some specimens.
 const LABELS: [(u8, Structure); 6] = [
@@ -15,6 +15,9 @@ const LABELS: [(u8, Structure); 6] = [
     (6, Structure::Femur(Side::Right)),
     (7, Structure::Sacrum),
 ];
+
+/// No label has a longer name.
+const MOST_NAME_BYTES: usize = 256;
 
 /// Turns label values to bones: by the names in `labels-def` where there are some, else by the numbers
 /// that the data set documents.
@@ -55,9 +58,7 @@ fn named(group: &Group) -> Vec<(u8, Structure)> {
         .iter()
         .filter_map(|part| {
             let value = part.parse().ok()?;
-            let names = group.dataset(part).ok()?.read_string().ok()?;
-            let name = names.first()?.trim_matches(['\0', ' ']).to_owned();
-            match LabelMeaning::recognized(&name)? {
+            match LabelMeaning::recognized(&name_of(group, part)?)? {
                 LabelMeaning::One(structure) => Some((value, structure)),
                 _ => None,
             }
@@ -65,4 +66,22 @@ fn named(group: &Group) -> Vec<(u8, Structure)> {
         .collect();
     values.sort_unstable();
     values
+}
+
+/// One text of a dataset, whichever of HDF5's two kinds of strings it is.
+fn name_of(group: &Group, part: &str) -> Option<String> {
+    let data = group.dataset(part).ok()?;
+    let alone = data.shape().ok()?.iter().all(|&n| n == 1);
+    let names = match data.dtype().ok()? {
+        DType::VariableLengthString if alone => data.read_vlen_strings(
+            VlenStringReadOptions::new()
+                .with_max_elements(1)
+                .with_max_payload_bytes(MOST_NAME_BYTES),
+        ),
+        DType::String if alone && data.element_size().ok()? <= MOST_NAME_BYTES as u64 => {
+            data.read_string()
+        }
+        _ => return None,
+    };
+    Some(names.ok()?.first()?.trim_matches(['\0', ' ']).to_owned())
 }

@@ -4,6 +4,8 @@ mod class_map;
 mod label_names;
 mod masks;
 mod multi_label;
+#[cfg(test)]
+mod tests;
 
 pub use class_map::TotalsegVersion;
 
