@@ -328,18 +328,23 @@ fn written_markups_come_back_and_are_not_overwritten() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("corrected.mrk.json");
     let rims = [ring(40), ring(24)];
-    write_markups(&expected(), &rims, &path).unwrap();
+    write_markups(&expected(), rims.each_ref().map(Vec::as_slice), &path).unwrap();
     let read = read_landmark_overrides(&path).unwrap();
     assert_eq!(read.landmarks, expected());
     assert_eq!(read.rims, rims.clone().map(Some));
     assert_eq!(read.ignored, [""; 0]);
     let before = std::fs::read(&path).unwrap();
-    let error = write_markups(&Landmarks::default(), &rims, &path).unwrap_err();
+    let error = write_markups(
+        &Landmarks::default(),
+        rims.each_ref().map(Vec::as_slice),
+        &path,
+    )
+    .unwrap_err();
     assert!(matches!(error, PointsFileError::Exists(_)), "{error}");
     assert_eq!(std::fs::read(&path).unwrap(), before);
     // A body without a rim has no curve.
     let path = folder.path().join("none.mrk.json");
-    write_markups(&expected(), &[vec![], vec![]], &path).unwrap();
+    write_markups(&expected(), [&[], &[]], &path).unwrap();
     assert_eq!(read_landmark_overrides(&path).unwrap().rims, [None, None]);
     // What Slicer's schema asks for.
     let text = std::fs::read_to_string(&path).unwrap();
@@ -386,7 +391,7 @@ fn rims_come_from_numbered_points_in_their_order() {
 fn one_rim_is_not_given_twice() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mrk.json");
-    write_markups(&expected(), &[ring(30), ring(30)], &path).unwrap();
+    write_markups(&expected(), [&ring(30), &ring(30)], &path).unwrap();
     let whole = std::fs::read_to_string(&path).unwrap();
     // Slicer numbers a name that it has already.
     let renamed = whole.replace("\"name\": \"rim_r\"", "\"name\": \"Left rim_1\"");

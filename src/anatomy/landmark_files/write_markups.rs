@@ -19,7 +19,7 @@ const SCHEMA: &str = "https://raw.githubusercontent.com/slicer/slicer/master/Mod
 /// When the file exists, since somebody may have corrected it, or the disk refuses.
 pub fn write_markups(
     landmarks: &Landmarks,
-    rims: &[Vec<Point>; 2],
+    rims: [&[Point]; 2],
     path: &Path,
 ) -> Result<(), PointsFileError> {
     let points = landmarks
@@ -27,7 +27,7 @@ pub fn write_markups(
         .map(|(landmark, side, at)| control_point(&landmark.key(side), &at));
     let mut markups = vec![markup("Fiducial", "landmarks", points.collect())];
     for side in Side::BOTH {
-        let rim = &rims[side.index()];
+        let rim = rims[side.index()];
         if rim.is_empty() {
             continue;
         }

@@ -170,7 +170,8 @@ fn assigned_ct(
     let shell = field(SHELL_MM);
     let profile = DepthProfile::new(p);
     // Centres of voxels lie half a voxel farther from each other than from the surface between.
-    let deep = squared_distance(&bones.map(|b| !b)).map(|d| f64::from(d).sqrt() - p.voxel_mm / 2.0);
+    let deep = squared_distance(&bones.map(|b| !b));
+    let deep_mm = |offset: usize| f64::from(deep.data[offset]).sqrt() - p.voxel_mm / 2.0;
     for (n, bone) in list.iter().enumerate() {
         let near = near_surface(bone.surface, grid, NEAR_MM.max(profile.reach_mm()));
         let changes: Vec<(usize, f32)> = near
@@ -181,7 +182,7 @@ fn assigned_ct(
                 let distance = f64::from(distance);
                 let depth_mm = match (inside, distance.is_finite()) {
                     (true, true) => distance,
-                    (true, false) => deep.data[offset].max(NEAR_MM),
+                    (true, false) => deep_mm(offset).max(NEAR_MM),
                     (false, _) if distance < profile.reach_mm() => -distance,
                     (false, _) => return None,
                 };
@@ -199,15 +200,15 @@ fn assigned_ct(
             hu.data[offset] += excess;
         }
     }
-    let noise: Vec<f32> = (0..grid.len())
-        .map(|_| stream.sample::<f32, _>(StandardNormal))
-        .collect();
-    let data = hu
-        .data
-        .par_iter()
-        .zip(noise)
-        .map(|(v, n)| (v + n * p.noise_hu as f32).round().clamp(-1024.0, 3071.0) as i16)
-        .collect();
+    // Each of these is as large as the CT itself.
+    drop((deep, texture, shell, bones, pelvis));
+    let noisy = |value: f32| {
+        let noise = stream.sample::<f32, _>(StandardNormal);
+        (value + noise * p.noise_hu as f32)
+            .round()
+            .clamp(-1024.0, 3071.0) as i16
+    };
+    let data = hu.data.into_iter().map(noisy).collect();
     Volume::new(grid.clone(), data)
 }
 

@@ -4,6 +4,7 @@ use super::source::Source;
 use crate::cli::args::Common;
 use crate::cli::error::{Exit, Failure};
 use crate::cli::output::say;
+use pao_sim::anatomy::Side;
 use pao_sim::anatomy::landmark_files::write_markups;
 use serde_json::json;
 use std::path::PathBuf;
@@ -28,7 +29,11 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         )));
     }
     let specimen = arguments.source.specimen()?;
-    write_markups(&specimen.landmarks, &specimen.rims, out)?;
+    write_markups(
+        &specimen.landmarks,
+        Side::BOTH.map(|side| specimen.rim(side)),
+        out,
+    )?;
     let landmarks = specimen.landmarks.iter().count();
     if common.json {
         say!(
