@@ -12,9 +12,8 @@ const ENDS: [&str; 4] = [".nii.gz", ".nii", ".nrrd", ".mha"];
 /// Reads `sacrum`, `hip_left`, `hip_right`, `femur_left` and `femur_right` of a folder.
 pub(super) fn read(dir: &Path) -> Result<(StructureLabels, Vec<Note>), CtImportError> {
     let file = |structure: Structure| -> Option<PathBuf> {
-        let named = |end: &&str| dir.join(format!("{}{end}", structure.name()));
         ENDS.iter()
-            .map(|end| named(&end))
+            .map(|end| dir.join(format!("{}{end}", structure.name())))
             .find(|path| path.is_file())
     };
     let missing: Vec<String> = Structure::ALL
