@@ -36,10 +36,12 @@ struct RimRow {
     uncertainty_mm: Option<f64>,
 }
 
-/// Every row that parses, and a line for each that does not.
+/// Every row that parses, and a line for each that does not. A row may end before the optional columns, as
+/// one does that a person adds; a longer one is refused, for it may hold decimal commas.
 fn rows<T: DeserializeOwned>(text: &str) -> (Vec<(u64, T)>, Vec<String>) {
     let mut reader = csv::ReaderBuilder::new()
         .comment(Some(b'#'))
+        .flexible(true)
         .trim(csv::Trim::All)
         .from_reader(text.as_bytes());
     let (mut good, mut bad) = (Vec::new(), Vec::new());
@@ -48,6 +50,17 @@ fn rows<T: DeserializeOwned>(text: &str) -> (Vec<(u64, T)>, Vec<String>) {
         Err(error) => return (good, vec![error.to_string()]),
     };
     for record in reader.records() {
+        if let Ok(record) = &record
+            && record.len() > headers.len()
+        {
+            bad.push(format!(
+                "line {}: {} cells under {} columns",
+                record.position().map_or(0, |p| p.line()),
+                record.len(),
+                headers.len()
+            ));
+            continue;
+        }
         match record.and_then(|r| {
             let line = r.position().map_or(0, |p| p.line());
             r.deserialize(Some(&headers)).map(|row| (line, row))
@@ -227,6 +240,16 @@ mod tests {
             (from.found, from.uncertainty_mm),
             (Some(Found::Picked), None)
         );
+        let (landmarks, bad) = parse_landmarks(&format!("{head}FH_l,1,2,3\nFH_r,1,2,3,given\n"));
+        assert!(bad.is_empty(), "{bad:?}");
+        let from = landmarks.provenance(Landmark::Fh, Side::Right);
+        assert_eq!(from, Some(Provenance::GIVEN));
+        let (_, bad) = parse_landmarks(&format!("{head}FH_l,1,5,2,5,3,5\nFH_r,1,2\n"));
+        assert!(
+            bad[0].contains("line 2: 7 cells under 6 columns"),
+            "{bad:?}"
+        );
+        assert!(bad[1].contains("line: 3"), "{bad:?}");
         for (cells, part) in [
             ("guessed,1", "guessed"),
             ("given,-1", "uncertainty_mm is -1"),
