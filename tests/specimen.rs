@@ -192,7 +192,7 @@ fn landmarks_go_to_slicer_and_come_back() {
     assert!(line.contains("16 landmarks and both rims"), "{line}");
     let back = read_landmark_overrides(&file).unwrap();
     assert_eq!(back.landmarks, BODY.landmarks);
-    assert_eq!(back.rims, BODY.rims.clone().map(Some));
+    assert_eq!(back.rims, BODY.rims.clone().map(|rim| Some(rim.to_vec())));
     let ((_, errors), _) = landmarks("body.mrk.json", 1);
     assert!(errors.contains("exists already"), "{errors}");
     let ((_, errors), _) = landmarks("body.fcsv", 2);
