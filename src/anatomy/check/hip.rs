@@ -21,7 +21,8 @@ const ON_BONE: [Landmark; 7] = [
 /// A rim's point is on bone within this distance (mm); over the notch it is not.
 const RIM_ON_BONE_MM: f64 = 3.0;
 
-pub(super) fn checks(specimen: &Arc<Specimen>, bones: &Bones, side: Side) -> Vec<Check> {
+/// The checks of one hip, and its femoral head's radius (mm; not a number where there is none).
+pub(super) fn checks(specimen: &Arc<Specimen>, bones: &Bones, side: Side) -> (Vec<Check>, f64) {
     let voxel = specimen.labels.grid.spacing.into_iter().fold(0.0, f64::max);
     // A landmark placed on the bone itself is up to a voxel's diagonal from the label's surface.
     let near = voxel.max(1.0) * 2.0;
@@ -43,7 +44,7 @@ pub(super) fn checks(specimen: &Arc<Specimen>, bones: &Bones, side: Side) -> Vec
     }
     // Without the landmarks of the frame there is nothing more to look at.
     let Ok(hip) = Hip::new(specimen.clone(), side) else {
-        return checks;
+        return (checks, f64::NAN);
     };
     let found = head(&hip, &bones.femurs[side.index()]);
     match &found {
@@ -92,7 +93,19 @@ pub(super) fn checks(specimen: &Arc<Specimen>, bones: &Bones, side: Side) -> Vec
         "the femur's shaft is missing from the lower part of the images, and its rotation is found from \
          what is left; use a scan that reaches 150 mm below the heads",
     ));
-    checks
+    (checks, radius)
+}
+
+/// The heads of one person are of one size.
+pub(super) fn radii([left, right]: [f64; 2]) -> Check {
+    let what = "femoral heads' radii, left and right";
+    let mut check = Check::number(what, (left - right).abs(), "mm", (0.0, 1.5), (0.0, 4.0));
+    check.found = format!("{left:.1} and {right:.1} mm");
+    check.expected = "at most 1.5 mm apart".into();
+    check.advise(
+        "one head's label is swollen, worn or holds something of the socket: its centre, about which the hip \
+         turns, may be off; look at both in the slices",
+    )
 }
 
 /// The sphere of the femur's label. Landmarks give its directions only, so it is a witness of its

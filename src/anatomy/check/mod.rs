@@ -103,13 +103,6 @@ impl Check {
         }
     }
 
-    /// The same check at its mildest: what would be wrong is only doubtful.
-    #[must_use]
-    pub fn mild(mut self) -> Self {
-        self.verdict = self.verdict.min(Verdict::Doubtful);
-        self
-    }
-
     /// The same check with what to say where it is not fine.
     #[must_use]
     pub fn advise(mut self, advice: impl Into<String>) -> Self {
@@ -145,9 +138,13 @@ pub fn check_specimen(specimen: &Arc<Specimen>) -> Vec<Check> {
     checks.extend(extent::checks(specimen));
     checks.extend(landmarks::checks(specimen));
     checks.extend(frames::checks(specimen, &bones));
+    let mut radii = [f64::NAN; 2];
     for side in Side::BOTH {
-        checks.extend(hip::checks(specimen, &bones, side));
+        let (of_hip, radius_mm) = hip::checks(specimen, &bones, side);
+        checks.extend(of_hip);
+        radii[side.index()] = radius_mm;
     }
+    checks.push(hip::radii(radii));
     checks
 }
 

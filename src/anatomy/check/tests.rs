@@ -258,6 +258,20 @@ fn labels_two_voxels_too_thick_and_one_too_thin_are_seen() {
 }
 
 #[test]
+fn a_swollen_head_is_seen() {
+    let head = at(Landmark::Fh, Side::Left);
+    let body = relabelled(|p, label| match label == 0 && (p - head).norm() < 27.0 {
+        true => 2,
+        false => label,
+    });
+    assert_turned(
+        &body,
+        &[],
+        &["femoral heads' radii", "left femur touching the pelvis"],
+    );
+}
+
+#[test]
 fn a_hole_and_an_island_are_seen() {
     let head = at(Landmark::Fh, Side::Left);
     let hollow = relabelled(|p, label| match (p - head).norm() < 6.0 {
