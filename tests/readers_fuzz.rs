@@ -13,6 +13,7 @@ use fuzzing::{CountingAllocator, Reader, Seed, fuzz};
 use pao_sim::anatomy::PatientFrame;
 use pao_sim::anatomy::import::deepfluoro::read_deepfluoro;
 use pao_sim::anatomy::import::labels::read_label_table;
+use pao_sim::anatomy::import::totalseg::read_totalseg;
 use pao_sim::anatomy::import::vsd::read_segmentation;
 use pao_sim::anatomy::landmark_files::read_landmark_overrides;
 use pao_sim::anatomy::surfaces::read_closed_surface;
@@ -60,6 +61,7 @@ fn readers() -> Vec<Reader> {
     let segments = of(&["layers.seg.nrrd"]);
     let file = |name: &str| Seed::files(vec![Path::new("tests/data").join(name)]);
     let layers = file("vsd/SMIR.Body.076Y.M.CT.1/layers.seg.nrrd");
+    let tables = files("label_tables", "", &[]);
     let named = nifti.clone();
     let any = [&nifti[..], &nrrd, &metaimage].concat();
     let reader = Reader::new;
@@ -81,30 +83,34 @@ fn readers() -> Vec<Reader> {
             fuzzing::said(read_nifti_extensions(path))
         }),
         reader("deepfluoro", vec![file("deepfluoro.h5")], |path| {
-            fuzzing::said(read_deepfluoro(path, None))
+            fuzzing::said(read_deepfluoro(path, Some("17-1882")))
         })
         .memory(64, 16 << 20),
         reader("vsd-segmentation", vec![layers], |path| {
             fuzzing::said(read_segmentation(path))
         })
         .memory(64, 1 << 20),
-        reader("label-table", label_tables(), |path| {
+        reader("label-table", tables, |path| {
             fuzzing::said(read_label_table(path))
         }),
+        reader("totalseg", vec![file("totalseg.nii.gz")], |path| {
+            fuzzing::said(read_totalseg(path, None))
+        })
+        .memory(16, 1 << 20),
         // Run lengths and Huffman codes grow a few dozen times.
         reader("dicom", dicom_slices(), |path| {
             fuzzing::said(read_dicom_series(path))
         })
         .memory(300, 8 << 20),
     ];
-    for ending in ["ply", "stl", "vtk", "obj"] {
+    for ending in [".ply", ".stl", ".vtk", ".obj"] {
         let seeds = files("surfaces", ending, &["unstructured.vtk"]);
         let surfaces = reader(ending, seeds, |path| {
             fuzzing::said(read_closed_surface(path, PatientFrame::Ras))
         });
         all.push(surfaces.memory(200, 1 << 20));
     }
-    for ending in ["fcsv", "mrk.json", "csv"] {
+    for ending in [".fcsv", ".mrk.json", ".csv"] {
         let points = reader(ending, files("points", ending, &[]), |path| {
             fuzzing::said(read_landmark_overrides(path))
         });
@@ -123,7 +129,7 @@ fn files(folder: &str, ending: &str, without: &[&str]) -> Vec<Seed> {
                 .file_name()
                 .expect("a file has a name")
                 .to_string_lossy();
-            name.ends_with(&format!(".{ending}")) && !without.contains(&&*name)
+            name.ends_with(ending) && !without.contains(&&*name)
         })
         .collect();
     paths.sort();
@@ -150,19 +156,6 @@ fn dicom_slices() -> Vec<Seed> {
         Seed::files(paths.to_vec())
     };
     encodings.into_iter().map(pair).collect()
-}
-
-fn label_tables() -> Vec<Seed> {
-    let csv = "value,structure\n1,hips\n2,femora\n3,sacrum\n";
-    let slicer = "# Color table\n0 Background 0 0 0 0\n1 hip_left 230 200 150 255\n2 hip_right 1 2 3 255\n\
-                  3 femur_left 1 2 3 255\n4 femur_right 1 2 3 255\n5 sacrum 9 9 9 255\n6 bladder 9 9 9 255\n";
-    let itksnap =
-        "0 0 0 0 0 0 0 \"Clear Label\"\n1 255 0 0 1 1 1 \"pelvis\"\n2 0 255 0 1 1 1 \"femora\"\n";
-    vec![
-        Seed::made("table.csv", csv.into()),
-        Seed::made("table.ctbl", slicer.into()),
-        Seed::made("labels.txt", itksnap.into()),
-    ]
 }
 
 #[test]

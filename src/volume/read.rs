@@ -140,7 +140,7 @@ mod tests {
             std::fs::write(&path, "some picture").unwrap();
             says(&path, part);
         }
-        says(folder.path(), "is a folder");
+        says(folder.path(), "holds no slice of a CT");
         says(Path::new("no/such.nrrd"), "No such file");
         says(Path::new("/dev/null"), "no regular file");
     }

@@ -10,6 +10,11 @@ use nalgebra::Rotation3;
 /// The iteration settles in two or three rounds; each visits a finite set of vertices.
 const MAX_ROUNDS: usize = 30;
 
+/// The pubic bones' foremost points lie within this part of the distance between both hip bones' centres
+/// from the midline; spines of the ilium lie farther out. Without it, a pelvis seen from above (flexed
+/// hips) offers its iliac spines as the foremost points of its lower half.
+const PUBIS: f64 = 0.375;
+
 /// Directions of the pelvis, and the points that define them.
 #[derive(Clone, Debug)]
 pub(super) struct PelvicFrame {
@@ -68,8 +73,9 @@ pub(super) fn pelvic_frame(bones: &BoneSurfaces) -> Result<PelvicFrame, DetectEr
     let no_axis = || DetectError::NoAxis { apart_mm };
     let mut axes = axes(&left, &right, &feet).ok_or_else(no_axis)?;
     for _ in 0..MAX_ROUNDS {
-        let [_, superior, anterior] = axes;
-        let ends = Side::BOTH.map(|side| foremost(bones.hip(side), &superior, &anterior));
+        let middle = nalgebra::center(&left, &right);
+        let medial = |p: &Point| (p - middle).dot(&axes[0]).abs() < PUBIS * apart_mm;
+        let ends = Side::BOTH.map(|side| foremost(bones.hip(side), &axes, &medial));
         let frame = PelvicFrame {
             axes,
             ilium: ends.map(|e| e.0),
@@ -99,8 +105,12 @@ fn mean(surface: &Surface) -> Point {
     Point::from(sum / surface.vertices().len() as f64)
 }
 
-/// The most anterior vertices of the upper and of the lower half of a hip bone.
-fn foremost(hip: &Surface, superior: &Vector, anterior: &Vector) -> (Point, Point) {
+/// The most anterior vertex of a hip bone's upper half, and of the medial part of its lower half.
+fn foremost(
+    hip: &Surface,
+    [_, superior, anterior]: &[Vector; 3],
+    medial: &dyn Fn(&Point) -> bool,
+) -> (Point, Point) {
     let height = |p: &Point| p.coords.dot(superior);
     let (mut low, mut high) = (f64::MAX, f64::MIN);
     for p in hip.vertices() {
@@ -112,7 +122,7 @@ fn foremost(hip: &Surface, superior: &Vector, anterior: &Vector) -> (Point, Poin
         let half = hip
             .vertices()
             .iter()
-            .filter(|p| (height(p) > middle) == upper);
+            .filter(|p| (height(p) > middle) == upper && (upper || medial(p)));
         half.copied()
             .max_by(|a, b| {
                 let front = |p: &Point| p.coords.dot(anterior);

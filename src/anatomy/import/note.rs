@@ -20,8 +20,6 @@ pub enum Note {
         voxels: usize,
         pieces: usize,
     },
-    #[error("no bone is the sacrum by itself: it is part of the hip bones, or images will lack it")]
-    NoSacrum,
     #[error("{voxels} voxels enclosed by the {structure} were added to it")]
     Filled { structure: Structure, voxels: usize },
     #[error("{voxels} voxels belong to both {first} and {second}; the {first} has them")]

@@ -67,9 +67,6 @@ pub fn specimen_from_ct(
     check_present(&import.structures)?;
     check_sides(&import.structures)?;
     let mut notes = import.notes;
-    if import.structures.absent().contains(&Structure::Sacrum) {
-        notes.push(Note::NoSacrum);
-    }
     notes.extend(check_overlap(&import.ct.grid, &import.structures)?);
     let (structures, cleaned) = clean(&import.structures);
     notes.extend(cleaned);
@@ -108,13 +105,10 @@ pub fn specimen_from_ct(
     Ok(Imported { specimen, notes })
 }
 
-/// Landmarks are sought on hip bones and femora.
 fn check_present(structures: &StructureLabels) -> Result<(), CtImportError> {
-    let mut absent = structures.absent();
-    absent.retain(|&s| s != Structure::Sacrum);
-    match absent.is_empty() {
-        true => Ok(()),
-        false => Err(CtImportError::Absent(absent)),
+    match structures.absent() {
+        absent if absent.is_empty() => Ok(()),
+        absent => Err(CtImportError::Absent(absent)),
     }
 }
 

@@ -66,7 +66,6 @@ fn both_ways_of_slicer_to_save_segments_are_read() {
 }
 
 #[test]
-#[ignore = "the CT is an NRRD file"]
 fn the_ct_lies_where_pynrrd_put_it() {
     let subject = read_vsd(&find_vsd(&folder()).unwrap()).unwrap();
     assert_eq!(subject.ct.at(2, 1, 4), 100 * 4 + 10 + 2 - 200);
