@@ -4,8 +4,10 @@ use assert_cmd::Command;
 use pao_sim::anatomy::landmark_files::read_landmark_overrides;
 use pao_sim::anatomy::surfaces::BONES;
 use pao_sim::anatomy::{
-    PhantomParameters, Specimen, phantom, phantom_structures, read_specimen, write_specimen,
+    Landmark, PhantomParameters, Side, Specimen, phantom, phantom_structures, read_specimen,
+    write_specimen,
 };
+use pao_sim::geometry::Vector;
 use pao_sim::volume::write_nifti;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -440,11 +442,18 @@ fn a_ct_with_a_label_map_is_imported_and_proved() {
     write_nifti(&bones.volume().map(|v| v.min(4)), &at("map.nii.gz")).unwrap();
     let rows = "value,structure\n1,sacrum\n2,hip_left\n3,hip_right\n4,femora\n";
     std::fs::write(at("table.csv"), rows).unwrap();
+    // One landmark from a person, in the other frame.
+    let picked =
+        body.landmarks.get(Landmark::Asis, Side::Left).unwrap() + Vector::new(1.5, 0.0, 0.0);
+    let (x, y, z) = (-picked.x, -picked.y, picked.z);
+    let points = format!("name,x_ras_mm,y_ras_mm,z_ras_mm\nleft ASIS,{x},{y},{z}\nnavel,0,0,0\n");
+    std::fs::write(at("points.csv"), points).unwrap();
     let import = |voxel_mm: &str, code: i32| {
         let mut command = pao_sim();
         command.args(["specimen", "import", "labels"]);
         command.args([at("ct.nii.gz"), at("map.nii.gz")]);
         command.arg("--table").arg(at("table.csv"));
+        command.arg("--landmarks").arg(at("points.csv"));
         command.arg("--out").arg(at("made"));
         command.args(["--voxel-mm", voxel_mm, "--sex", "male", "--json"]);
         said(&mut command, code)
@@ -456,8 +465,15 @@ fn a_ct_with_a_label_map_is_imported_and_proved() {
     let told: serde_json::Value = serde_json::from_str(&told).unwrap();
     assert_eq!(told["specimen"], "made");
     assert_eq!(told["voxel_mm"], 2.0);
-    assert!(told["notes"].is_array());
+    let notes = told["notes"].to_string();
+    assert!(
+        notes.contains("taken from the landmark file: ASIS_l"),
+        "{notes}"
+    );
+    assert!(notes.contains("navel"), "{notes}");
     let made = read_specimen(&at("made")).unwrap();
+    let asis = made.landmarks.get(Landmark::Asis, Side::Left).unwrap();
+    assert!((asis - picked).norm() < 1e-9, "{asis}");
     assert_eq!(made.source.kind, "labels");
     assert_eq!(made.source.sex, "male");
     assert!(!made.source.assigned_density);
