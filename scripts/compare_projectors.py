@@ -1,6 +1,7 @@
 """Milliseconds a DRR beside other programs: one volume, geometry, machine and thread, in interleaved rounds.
 
-    python3 -m venv /tmp/check && /tmp/check/bin/pip install numpy itk-rtk itk-twoprojectionregistration
+    python3 -m venv /tmp/check
+    /tmp/check/bin/pip install numpy itk-rtk itk-twoprojectionregistration plastimatch nanodrr diffdrr
     cargo build --release --example projector_speed
     /tmp/check/bin/python scripts/compare_projectors.py [ROUNDS]
 
@@ -10,12 +11,15 @@ one). Ours are projected in batches of eight poses within two degrees, as a popu
 batches, and neither does `slice_one`. Processor time,
 minima over the rounds (default 7).
 
-RTK's Joseph projector interpolates bilinearly in planes of voxels; ITK's Siddon-Jacobs takes the exact path through voxels without
-interpolation.
+RTK's Joseph projector interpolates bilinearly in planes of voxels; ITK's Siddon-Jacobs, Plastimatch's `exact` and DiffDRR's Siddon take the
+exact path through voxels without interpolation; nanodrr and DiffDRR's Trilinear interpolate at as many points as make steps of 1 mm. Of Plastimatch, which is a program, a run that casts one ray is subtracted. The rays of nanodrr and
+DiffDRR are given to their renderers, so no convention of theirs comes in between.
 """
 
 import csv
+import os
 import pathlib
+import resource
 import subprocess
 import sys
 import tempfile
@@ -23,12 +27,18 @@ import time
 
 import itk
 import numpy as np
+import torch
+from diffdrr.renderers import Siddon, Trilinear
 from itk import RTK as rtk
+from nanodrr.data import Subject
+from nanodrr.drr import render
 
 SDD, PIXEL, SIZE = 1020.0, 1.552, 192
 IMAGE = itk.Image[itk.F, 3]
 itk.MultiThreaderBase.SetGlobalMaximumNumberOfThreads(1)
 itk.MultiThreaderBase.SetGlobalDefaultNumberOfThreads(1)
+torch.set_num_threads(1)
+torch.set_grad_enabled(False)
 
 
 def moved_volume(path, rotation, shift):
@@ -113,6 +123,115 @@ def siddon(path, rotation, shift):
     return run
 
 
+def attenuation(path):
+    """The volume (mu per mm, indexed [k, j, i]) and its `world_from_voxel`."""
+    ct = itk.imread(str(path), itk.SS)
+    affine = np.eye(4)
+    affine[:3, :3] = itk.array_from_matrix(ct.GetDirection()) * np.array(ct.GetSpacing())
+    affine[:3, 3] = ct.GetOrigin()
+    return np.maximum(0, (itk.array_from_image(ct) + 130.0) * 2.68275e-5).astype(np.float32), affine
+
+
+def rays(rotation, shift):
+    """`camera_from_volume`, and where each pixel lies in the camera's frame."""
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = rotation, shift
+    across = (np.arange(SIZE) - (SIZE - 1) / 2) * PIXEL
+    y, x = np.meshgrid(across, across, indexing="ij")
+    return pose, np.stack([x, y, np.full_like(x, -SDD)], axis=-1).reshape(-1, 3)
+
+
+def steps(pose, affine, shape):
+    """How many mm of depth the volume takes, along the steepest ray."""
+    corners = np.array(np.meshgrid(*((0, n - 1) for n in shape[::-1]))).reshape(3, -1)
+    depths = (pose @ affine)[2, :3] @ corners
+    return int(np.ptp(depths) * 1.03) + 2
+
+
+def timed(work):
+    start = time.process_time()
+    image = work()
+    return np.asarray(image, dtype=float).reshape(SIZE, SIZE), time.process_time() - start
+
+
+def diffdrr(renderer):
+    def make(path, rotation, shift):
+        values, affine = attenuation(path)
+        pose, pixels = rays(rotation, shift)
+        density = torch.from_numpy(np.ascontiguousarray(values.transpose(2, 1, 0)))
+        voxel_from_camera = np.linalg.inv(pose @ affine)
+        to_voxels = lambda p: torch.from_numpy((p @ voxel_from_camera[:3, :3].T + voxel_from_camera[:3, 3]).astype(np.float32))[None]
+        source, target = to_voxels(np.zeros((1, 3))), to_voxels(pixels)
+        lengths = torch.from_numpy(np.linalg.norm(pixels, axis=1).astype(np.float32))[None, None]
+        project = renderer()
+        options = {"n_points": steps(pose, affine, values.shape)} if renderer is Trilinear else {}
+        return lambda: timed(lambda: project(density, source, target, lengths, **options))
+
+    return make
+
+
+def nanodrr(path, rotation, shift):
+    values, affine = attenuation(path)
+    pose, pixels = rays(rotation, shift)
+    tensor = lambda a: torch.from_numpy(np.ascontiguousarray(a, dtype=np.float32))
+    grid_from_voxel = np.diag(2.0 / np.array([*values.shape[::-1], 2.0]))
+    grid_from_voxel[:3, 3] = 1.0 / np.array(values.shape[::-1]) - 1.0
+    image = tensor(values)[None, None]
+    subject = Subject(image, torch.zeros_like(image), tensor(affine), tensor(np.linalg.inv(affine)), tensor(grid_from_voxel),
+                      torch.zeros(3), max_label=0, convert_to_mu=False)
+    samples = steps(pose, affine, values.shape)
+    given = {"src": torch.zeros(1, 1, 3), "tgt": tensor(pixels)[None], "n_samples": samples, "backend": "torch"}
+    view = (torch.eye(3)[None], tensor(np.linalg.inv(pose))[None], torch.tensor([SDD]), SIZE, SIZE)
+    return lambda: timed(lambda: render(subject, *view, **given))
+
+
+def plastimatch(path, rotation, shift):
+    values, affine = attenuation(path)
+    folder = pathlib.Path(path).parent / f"plastimatch-{rotation[0, 0]:.6f}"
+    folder.mkdir(exist_ok=True)
+    volume = itk.image_from_array(values)
+    volume.SetSpacing(np.linalg.norm(affine[:3, :3], axis=0).tolist())
+    volume.SetOrigin(affine[:3, 3].tolist())
+    itk.imwrite(volume, str(folder / "volume.mha"))
+    back = rotation.T
+    source = -back @ shift
+    toward = back @ [0.0, 0.0, 1.0]
+    text = lambda v: " ".join(f"{x:.9g}" for x in v)
+    command = ["plastimatch", "drr", "-i", "exact", "-P", "none", "-t", "pfm", "-r", f"{SIZE} {SIZE}", "-z", f"{SIZE * PIXEL} {SIZE * PIXEL}",
+               "-c", f"{(SIZE - 1) / 2} {(SIZE - 1) / 2}", "--sad", "800", "--sid", str(SDD), f"--nrm={text(toward)}",
+               f"--vup={text(back @ [0.0, -1.0, 0.0])}", f"--isocenter={text(source - 800 * toward)}"]
+    command[0] = str(pathlib.Path(sys.executable).parent / "plastimatch")
+
+    def seconds(*more):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run([*command, *more, "-O", str(folder / "drr"), str(folder / "volume.mha")], check=True, stdout=subprocess.DEVNULL,
+                       env={**os.environ, "OMP_NUM_THREADS": "1"})
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+
+    def run():
+        for old in folder.glob("drr*"):
+            old.unlink()
+        without = min(seconds("-w", "0 0 0 0") for _ in range(3))
+        whole = min(seconds() for _ in range(3))
+        raw = next(folder.glob("drr*.pfm")).read_bytes()
+        image = np.frombuffer(raw[-4 * SIZE * SIZE :], np.float32).reshape(SIZE, SIZE)
+        # Its columns run the other way, and its lengths are in cm.
+        return 10.0 * image[:, ::-1], whole - without
+
+    return run
+
+
+PEERS = [
+    ("RTK Joseph", joseph),
+    ("ITK Siddon-Jacobs", siddon),
+    ("Plastimatch exact", plastimatch),
+    ("nanodrr", nanodrr),
+    ("DiffDRR Trilinear", diffdrr(Trilinear)),
+    ("DiffDRR Siddon", diffdrr(Siddon)),
+]
+
+
 def difference(image, truth):
     percent = 100 / truth.max()
     return percent * np.sqrt(np.mean((image - truth) ** 2)), np.corrcoef(image.ravel(), truth.ravel())[0, 1]
@@ -128,7 +247,7 @@ def main(rounds):
         peers = {}
         for row in rows:
             pose = np.array([float(v) for v in row["camera_from_volume"].split()]).reshape(3, 4)
-            for name, make in (("RTK Joseph", joseph), ("ITK Siddon-Jacobs", siddon)):
+            for name, make in PEERS:
                 if (row["view"], name) not in peers:
                     peers[row["view"], name] = [make(folder / "volume.nii.gz", pose[:, :3], pose[:, 3]), np.inf]
         read = lambda name: np.fromfile(folder / f"{name}.f32", np.float32).reshape(SIZE, SIZE).astype(float)
@@ -156,7 +275,7 @@ def main(rounds):
             for t, (_, name, rms, r) in good:
                 fit = r > 0.99
                 wrong |= not fit
-                share = f"1/{fastest / t:.1f}" if fit else "the image is wrong"
+                share = ("" if (view, name) in peers else f"1/{fastest / t:.1f}") if fit else "the image is wrong"
                 print(f"| {name} | {t:.2f} | {share} | {rms:.3f} | {r:.6f} |")
     return wrong
 

@@ -72,7 +72,7 @@ impl Scene {
                     *v += 0.02 * (i * 7919 % 101) as f32;
                 }
                 ScorerView {
-                    fixed: Arc::new(FixedView::new(image, camera.clone(), 11, 1.0).unwrap()),
+                    fixed: Arc::new(FixedView::new(image, camera, 11, 1.0).unwrap()),
                     camera_from_world,
                 }
             })
