@@ -426,6 +426,27 @@ fn a_real_subject_is_imported_and_proved() {
     assert_eq!(made.source.licence, "CC BY-NC-SA 4.0");
     let (table, _) = check(&out, 0);
     assert!(table.contains("0 wrong"), "{table}");
+
+    // What a person placed goes before what is found by rule.
+    let asis = |specimen: &Specimen| specimen.landmarks.get(Landmark::Asis, Side::Left).unwrap();
+    let picked = asis(&made) + Vector::new(0.0, 1.5, 0.0);
+    let points = folder.path().join("points.csv");
+    let (x, y, z) = (picked.x, picked.y, picked.z);
+    let rows = format!("name,x_lps_mm,y_lps_mm,z_lps_mm\nASIS-L,{x},{y},{z}\n");
+    std::fs::write(&points, rows).unwrap();
+    let corrected = folder.path().join("corrected");
+    let mut command = pao_sim();
+    command.args(["specimen", "import", "surfaces"]).arg(&data);
+    command.arg("--out").arg(&corrected);
+    command.arg("--config").arg(&config);
+    let (told, _) = said(command.arg("--landmarks").arg(&points), 0);
+    assert!(
+        told.contains("taken from the landmark file: ASIS_l"),
+        "{told}"
+    );
+    let corrected = read_specimen(&corrected).unwrap();
+    assert!((asis(&corrected) - picked).norm() < 1e-9);
+    assert_eq!(corrected.rims[0].to_vec(), made.rims[0].to_vec());
 }
 
 /// A CT and a label map in which both femora have one value.

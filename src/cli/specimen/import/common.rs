@@ -6,7 +6,7 @@ use crate::cli::output::say;
 use pao_sim::anatomy::import::{
     CtImport, CtImportParameters, CtOrigin, Imported, Note, specimen_from_ct,
 };
-use pao_sim::anatomy::landmark_files::read_landmark_overrides;
+use pao_sim::anatomy::landmark_files::{LandmarkOverrides, read_landmark_overrides};
 use pao_sim::anatomy::{Landmarks, Specimen, SpecimenError, StructureLabels, write_specimen};
 use pao_sim::volume::{Volume, read_dicom_series_of, read_volume};
 use serde_json::json;
@@ -92,23 +92,17 @@ impl Target {
 
     /// Makes the specimen, writes it and tells about it.
     pub fn finish(&self, read: Read, known: Known, common: &Common) -> Result<Exit, Failure> {
-        let (mut landmarks, mut rims, mut notes) = (read.landmarks, [None, None], read.notes);
-        if let Some(file) = &self.landmarks {
-            let given = read_landmark_overrides(file)?;
-            for (landmark, side, point) in given.landmarks.iter() {
-                landmarks.set(landmark, side, point);
-            }
-            rims = given.rims;
-            let place = file.display();
-            let ignored = given.ignored.iter();
-            notes.extend(ignored.map(|line| Note::Reader(format!("{place}: {line}"))));
+        let (mut landmarks, mut notes) = (read.landmarks, read.notes);
+        let given = given(self.landmarks.as_deref(), &mut notes)?;
+        for (landmark, side, point) in given.landmarks.iter() {
+            landmarks.set(landmark, side, point);
         }
         let flag = |flag: &Option<String>, known: String| flag.clone().unwrap_or(known);
         let import = CtImport {
             ct: read.ct,
             structures: read.structures,
             landmarks,
-            rims,
+            rims: given.rims,
             origin: CtOrigin {
                 kind: known.kind,
                 name: self.name.clone().unwrap_or_else(|| folder_name(&self.out)),
@@ -127,6 +121,17 @@ impl Target {
         tell(&specimen, &self.out, &notes, common);
         Ok(Exit::Complete)
     }
+}
+
+/// What a landmark file gives; a note for each of its points that means nothing. Nothing without a file.
+pub fn given(file: Option<&Path>, notes: &mut Vec<Note>) -> Result<LandmarkOverrides, Failure> {
+    let Some(file) = file else {
+        return Ok(LandmarkOverrides::default());
+    };
+    let given = read_landmark_overrides(file)?;
+    let told = |line| Note::Reader(format!("{}: {line}", file.display()));
+    notes.extend(given.ignored.iter().map(told));
+    Ok(given)
 }
 
 /// An error when the folder exists.

@@ -1,11 +1,12 @@
 //! From closed surfaces of the bones.
 
-use super::common::{check_free, folder_name, tell};
+use super::common::{check_free, folder_name, given, tell};
 use crate::cli::args::Common;
 use crate::cli::error::{Exit, Failure};
 use crate::cli::specimen::source::Bodies;
+use pao_sim::anatomy::import::Note;
 use pao_sim::anatomy::surfaces::{SurfacesOrigin, read_bone_surfaces, specimen_from_surfaces};
-use pao_sim::anatomy::{Specimen, write_specimen};
+use pao_sim::anatomy::{Side, Specimen, write_specimen};
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -28,6 +29,9 @@ pub struct Arguments {
     /// Where the surfaces come from; default as surfaces.toml says
     #[arg(long, value_name = "TEXT")]
     from: Option<String>,
+    /// Landmarks and rims that people placed (.fcsv, .mrk.json, .csv); they replace those found by rule
+    #[arg(long, value_name = "FILE")]
+    landmarks: Option<PathBuf>,
     #[command(flatten)]
     bodies: Bodies,
 }
@@ -35,9 +39,25 @@ pub struct Arguments {
 pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     // What takes a minute is not begun for a folder that cannot be written.
     check_free(&arguments.out)?;
-    let specimen = specimen(arguments)?;
+    let mut notes = Vec::new();
+    let given = given(arguments.landmarks.as_deref(), &mut notes)?;
+    let mut specimen = specimen(arguments)?;
+    let mut names = Vec::new();
+    for (landmark, side, point) in given.landmarks.iter() {
+        specimen.landmarks.set(landmark, side, point);
+        names.push(landmark.key(side));
+    }
+    for (side, rim) in Side::BOTH.into_iter().zip(given.rims) {
+        if let Some(rim) = rim {
+            specimen.rims[side.index()] = rim.into();
+            names.push(format!("{side} rim"));
+        }
+    }
+    if !names.is_empty() {
+        notes.push(Note::Overridden(names.join(", ")));
+    }
     write_specimen(&specimen, &arguments.out)?;
-    tell(&specimen, &arguments.out, &[], common);
+    tell(&specimen, &arguments.out, &notes, common);
     Ok(Exit::Complete)
 }
 
