@@ -1,7 +1,7 @@
 //! The side of `scripts/compare_projectors.py` that times this program: makes a volume the size of a
 //! pelvis, projects it, and projects it again whenever it is asked to.
 //!
-//! `cargo run --release --example projector_speed -- FOLDER` writes `volume.nii.gz` (Hounsfield units),
+//! `cargo run --release --example projector_speed -- FOLDER [PIXELS]` writes `volume.nii.gz` (Hounsfield units),
 //! `views.csv` and one image (32-bit floats, row after row) for each view and projector, and the integral
 //! by double-precision samples every 0.125 mm. Then, for each
 //! line on its input, it prints one line with the milliseconds a DRR, in the order of `views.csv` and in
@@ -103,7 +103,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let units = AttenuationParameters::default();
     let bone = BoneVolume::from_attenuation(&ct.map(|hu| units.mu(f32::from(hu))))
         .ok_or("the volume holds bone")?;
-    let camera = Camera::centered(192, 1.552, 1020.0);
+    let size = std::env::args()
+        .nth(2)
+        .map_or(Ok(192), |text| text.parse())?;
+    let camera = Camera::centered(size, 1.552, 1020.0);
     let pixels = camera.width * camera.height;
 
     let mut views = String::from("view,projector,level,camera_from_volume\n");

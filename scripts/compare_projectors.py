@@ -3,9 +3,9 @@
     python3 -m venv /tmp/check
     /tmp/check/bin/pip install numpy itk-rtk itk-twoprojectionregistration plastimatch nanodrr diffdrr
     cargo build --release --example projector_speed
-    /tmp/check/bin/python scripts/compare_projectors.py [ROUNDS]
+    /tmp/check/bin/python scripts/compare_projectors.py [ROUNDS [PIXELS]]
 
-A made-up pelvis of 300 x 250 x 220 voxels of 1 mm on 192 x 192 pixels, AP and oblique. Each image is compared with
+A made-up pelvis of 300 x 250 x 220 voxels of 1 mm on 192 x 192 pixels (PIXELS), AP and oblique. Each image is compared with
 samples every 0.125 mm in double precision before its time counts; a time beside a wrong image is worth nothing (ITK's Siddon-Jacobs is much faster on rays that miss the volume, for
 one). Ours are projected in batches of eight poses within two degrees, as a population is; theirs know no
 batches, and neither does `slice_one`. Processor time,
@@ -33,7 +33,8 @@ from itk import RTK as rtk
 from nanodrr.data import Subject
 from nanodrr.drr import render
 
-SDD, PIXEL, SIZE = 1020.0, 1.552, 192
+SDD, PIXEL = 1020.0, 1.552
+SIZE = int(sys.argv[2]) if len(sys.argv) > 2 else 192
 IMAGE = itk.Image[itk.F, 3]
 itk.MultiThreaderBase.SetGlobalMaximumNumberOfThreads(1)
 itk.MultiThreaderBase.SetGlobalDefaultNumberOfThreads(1)
@@ -241,7 +242,7 @@ def main(rounds):
     program = pathlib.Path(__file__).parent.parent / "target/release/examples/projector_speed"
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
-        ours = subprocess.Popen([program, folder], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        ours = subprocess.Popen([program, folder, str(SIZE)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         assert ours.stdout.readline().strip() == "ready"
         rows = list(csv.DictReader(open(folder / "views.csv")))
         peers = {}
