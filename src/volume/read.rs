@@ -4,6 +4,7 @@ use super::dicom::read_dicom_series;
 use super::metaimage::{is_metaimage, read_metaimage};
 use super::nifti::{is_nifti, read_nifti};
 use super::nrrd::read_nrrd;
+use super::samples::voxel_of;
 use super::{Volume, VolumeFileError, Voxel, source};
 use std::io::Read;
 use std::path::Path;
@@ -53,18 +54,10 @@ pub fn read_volume<T: Voxel>(path: &Path) -> Result<Volume<T>, VolumeFileError> 
 /// Reads the one DICOM series of a folder, or the series that a file of it belongs to.
 fn read_series<T: Voxel>(path: &Path) -> Result<Volume<T>, VolumeFileError> {
     let ct = read_dicom_series(path)?;
-    let mut data = Vec::with_capacity(ct.data.len());
-    for (offset, &hu) in ct.data.iter().enumerate() {
-        let value = f64::from(hu);
-        data.push(
-            T::from_file_value(value).map_err(|problem| VolumeFileError::Value {
-                path: path.into(),
-                voxel: ct.grid.voxel(offset),
-                value,
-                problem,
-            })?,
-        );
-    }
+    let voxels = ct.data.iter().enumerate();
+    let data = voxels
+        .map(|(offset, &hu)| voxel_of(hu.into(), &ct.grid, offset, path))
+        .collect::<Result<_, _>>()?;
     Ok(Volume::new(ct.grid, data))
 }
 

@@ -67,6 +67,24 @@ impl SampleType {
     }
 }
 
+/// The voxel of a file's value at a position in memory.
+///
+/// # Errors
+/// When `T` cannot hold it.
+pub(super) fn voxel_of<T: Voxel>(
+    value: f64,
+    grid: &Grid,
+    offset: usize,
+    path: &Path,
+) -> Result<T, VolumeFileError> {
+    T::from_file_value(value).map_err(|problem| VolumeFileError::Value {
+        path: path.into(),
+        voxel: grid.voxel(offset),
+        value,
+        problem,
+    })
+}
+
 /// The volume of a file's raw numbers, i fastest; each becomes `number * slope + intercept`.
 ///
 /// # Errors
@@ -86,14 +104,7 @@ pub(super) fn volume_of_samples<T: Voxel>(
     let mut data = Vec::with_capacity(grid.len());
     for (offset, bytes) in raw.chunks_exact(kind.size()).enumerate() {
         let value = decode(bytes) * slope + intercept;
-        data.push(
-            T::from_file_value(value).map_err(|problem| VolumeFileError::Value {
-                path: path.into(),
-                voxel: grid.voxel(offset),
-                value,
-                problem,
-            })?,
-        );
+        data.push(voxel_of(value, &grid, offset, path)?);
     }
     Ok(Volume::new(grid, data))
 }

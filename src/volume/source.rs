@@ -3,7 +3,7 @@
 
 use super::{Volume, VolumeFileError, Voxel};
 use crate::volume::Grid;
-use crate::volume::samples::SampleType;
+use crate::volume::samples::{SampleType, voxel_of};
 use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -192,20 +192,13 @@ pub(super) fn read_text<T: Voxel>(
         .filter(|word| !word.is_empty());
     let mut data = Vec::new();
     for word in words.take(grid.len()) {
-        let voxel = grid.voxel(data.len());
         let number = std::str::from_utf8(word).ok().and_then(|w| w.parse().ok());
         let value: f64 = number.ok_or_else(|| {
+            let voxel = grid.voxel(data.len());
             let start = String::from_utf8_lossy(&word[..word.len().min(40)]);
             not_text(format!("voxel {voxel:?} is '{start}', which is no number"))
         })?;
-        data.push(
-            T::from_file_value(value).map_err(|problem| VolumeFileError::Value {
-                path: path.into(),
-                voxel,
-                value,
-                problem,
-            })?,
-        );
+        data.push(voxel_of(value, &grid, data.len(), path)?);
     }
     if data.len() != grid.len() {
         let (found, expected) = (data.len(), grid.len());
