@@ -42,16 +42,13 @@ impl Reader {
     }
 }
 
-/// Valid files that belong together.
+/// Valid files that belong together; the reader is given the first.
 #[derive(Clone)]
 pub struct Seed {
     files: Vec<(String, Vec<u8>)>,
-    whole_folder: bool,
 }
 
-#[allow(dead_code, reason = "not every format is a folder")]
 impl Seed {
-    /// Some files; the reader is given the first.
     pub fn files(paths: Vec<PathBuf>) -> Self {
         let named = |path: PathBuf| {
             let name = path.file_name().expect("a file has a name");
@@ -60,29 +57,6 @@ impl Seed {
         };
         Self {
             files: paths.into_iter().map(named).collect(),
-            whole_folder: false,
-        }
-    }
-
-    /// Bytes made by the test itself, as a file of this name.
-    pub fn made(name: &str, bytes: Vec<u8>) -> Self {
-        Self {
-            files: vec![(name.into(), bytes)],
-            whole_folder: false,
-        }
-    }
-
-    /// All files of a folder; the reader is given the folder.
-    pub fn folder(folder: &Path) -> Self {
-        let entries =
-            std::fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
-        let mut paths: Vec<PathBuf> = entries
-            .map(|entry| entry.expect("it can be listed").path())
-            .collect();
-        paths.sort();
-        Self {
-            whole_folder: true,
-            ..Self::files(paths)
         }
     }
 }

@@ -145,10 +145,7 @@ impl Fuzzing<'_> {
 
     /// What a reader says of a seed whose files lie in `folder`, the memory it took and the time; `None` when it panics.
     fn read(&mut self, seed: &Seed, folder: &Path) -> Option<(Result<(), String>, u64, Duration)> {
-        let path = match seed.whole_folder {
-            true => folder.to_owned(),
-            false => folder.join(&seed.files[0].0),
-        };
+        let path = folder.join(&seed.files[0].0);
         let read = self.reader.read;
         let start = Instant::now();
         BEGAN.store(now_ms(), Relaxed);
