@@ -42,9 +42,14 @@ torch.set_num_threads(1)
 torch.set_grad_enabled(False)
 
 
+def mu(ct):
+    """Attenuation per mm, indexed [k, j, i]."""
+    return np.maximum(0, (itk.array_from_image(ct) + 130.0) * 2.68275e-5).astype(np.float32)
+
+
 def moved_volume(path, rotation, shift):
     ct = itk.imread(str(path), itk.SS)
-    values = np.maximum(0, (itk.array_from_image(ct) + 130.0) * 2.68275e-5).astype(np.float32)
+    values = mu(ct)
     volume = itk.image_from_array(values)
     volume.SetSpacing(np.array(ct.GetSpacing()).tolist())
     direction = itk.array_from_matrix(ct.GetDirection())
@@ -83,7 +88,7 @@ def siddon(path, rotation, shift):
     """ITK's ray caster of two-projection registration. It takes the volume's corner to be at the origin and its axes to be the
     world's, so the pose goes into its transform; its sums are in parts of the ray."""
     ct = itk.imread(str(path), itk.SS)
-    values = np.maximum(0, (itk.array_from_image(ct) + 130.0) * 2.68275e-5).astype(np.float32)
+    values = mu(ct)
     volume = itk.image_from_array(values)
     size = np.array(values.shape[::-1], dtype=float)
     middle = size / 2
@@ -130,7 +135,7 @@ def attenuation(path):
     affine = np.eye(4)
     affine[:3, :3] = itk.array_from_matrix(ct.GetDirection()) * np.array(ct.GetSpacing())
     affine[:3, 3] = ct.GetOrigin()
-    return np.maximum(0, (itk.array_from_image(ct) + 130.0) * 2.68275e-5).astype(np.float32), affine
+    return mu(ct), affine
 
 
 def rays(rotation, shift):
