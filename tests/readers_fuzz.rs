@@ -60,7 +60,8 @@ fn readers() -> Vec<Reader> {
     ]);
     let segments = of(&["layers.seg.nrrd"]);
     let file = |name: &str| Seed::files(vec![Path::new("tests/data").join(name)]);
-    let layers = file("vsd/SMIR.Body.076Y.M.CT.1/layers.seg.nrrd");
+    let segmentations = ["SMIR.Pelvis-Thighs_Reconstruction", "layers"]
+        .map(|name| file(&format!("vsd/SMIR.Body.076Y.M.CT.1/{name}.seg.nrrd")));
     let tables = files("label_tables", "", &[]);
     let named = nifti.clone();
     let any = [&nifti[..], &nrrd, &metaimage].concat();
@@ -86,10 +87,9 @@ fn readers() -> Vec<Reader> {
             fuzzing::said(read_deepfluoro(path, Some("17-1882")))
         })
         .memory(64, 16 << 20),
-        reader("vsd-segmentation", vec![layers], |path| {
+        reader("vsd-segmentation", segmentations.to_vec(), |path| {
             fuzzing::said(read_segmentation(path))
-        })
-        .memory(64, 1 << 20),
+        }),
         reader("label-table", tables, |path| {
             fuzzing::said(read_label_table(path))
         }),

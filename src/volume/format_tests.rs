@@ -487,7 +487,11 @@ fn a_segmentation_is_a_label_map_with_names() {
         "Segment2_LabelValue is missing",
     );
     refused("Segment2_Name", "Segment2_Extent", "no Segment2_Name");
-    refused("Segment2_Layer:=0", "Segment2_Layer:=1", "2 layers");
+    refused(
+        "Segment2_Layer:=0",
+        "Segment2_Layer:=1",
+        "Segment2_Layer is 1; expected 0 to 0",
+    );
 }
 
 #[test]
@@ -500,7 +504,10 @@ fn overlapping_segments_are_refused_with_what_to_do() {
         .replace("sizes: 2 3 4", "sizes: 2 2 3 2")
         .replace("(1.5,0,0)", "none (1.5,0,0)");
     std::fs::write(&path, text).unwrap();
-    let message = read_volume::<u8>(&path).unwrap_err().to_string();
-    assert!(message.contains("2 layers"), "{message}");
-    assert!(message.contains("in Slicer, export"), "{message}");
+    let volume = read_volume::<u8>(&path).unwrap_err();
+    let names = nrrd_segment_names(&path).unwrap_err();
+    for message in [volume.to_string(), names.to_string()] {
+        assert!(message.contains("2 layers"), "{message}");
+        assert!(message.contains("in Slicer, export"), "{message}");
+    }
 }

@@ -19,12 +19,27 @@ const MILLIMETRE: [&str; 7] = [
 /// The kinds of axes that lie in the world, or may.
 const SPATIAL: [&str; 4] = ["domain", "space", "???", "none"];
 
-/// The grid (LPS) that a header describes.
+/// Nobody draws so many segments, and a voxel's labels in all layers are held at once.
+const MAX_LAYERS: i64 = 4096;
+
+/// The grid (LPS) of a file with one value a voxel.
+///
+/// # Errors
+/// As [`layered_grid_of`] has them, and when a segmentation has several layers.
+pub(super) fn grid_of(header: &Header) -> Result<Grid, VolumeFileError> {
+    match layered_grid_of(header)? {
+        (grid, 1) => Ok(grid),
+        (_, layers) => Err(overlap(header, layers)),
+    }
+}
+
+/// The grid (LPS) that a header describes, and how many values each voxel has: one, or where segments of a
+/// segmentation overlap one for each of its layers, which follow each other in the file.
 ///
 /// # Errors
 /// When it has not three axes of more than one voxel in the world, is not placed in LPS, RAS or LAS
-/// mm, or holds more than one value a voxel.
-pub(super) fn grid_of(header: &Header) -> Result<Grid, VolumeFileError> {
+/// mm, or holds several values a voxel that are no layers.
+pub(super) fn layered_grid_of(header: &Header) -> Result<(Grid, usize), VolumeFileError> {
     let sizes = header.sizes()?;
     let lps = lps_from_space(header)?;
     check_units(header)?;
@@ -33,9 +48,22 @@ pub(super) fn grid_of(header: &Header) -> Result<Grid, VolumeFileError> {
     let spatial: Vec<usize> = (0..sizes.len())
         .filter(|&axis| directions[axis].is_some())
         .collect();
+    let layers = match has_layers(header, &directions) {
+        true => sizes[0],
+        false => 1,
+    };
+    if !(1..=MAX_LAYERS).contains(&layers) {
+        return Err(header.wrong(format!(
+            "its segments lie in {layers} layers; expected 1 to {MAX_LAYERS}"
+        )));
+    }
     for axis in 0..sizes.len() {
-        if directions[axis].is_none() && sizes[axis] != 1 {
-            return Err(several_values(header, axis, sizes[axis]));
+        let expected = if axis == 0 { layers } else { 1 };
+        if directions[axis].is_none() && sizes[axis] != expected {
+            return Err(header.wrong(format!(
+                "its axis {axis} does not lie in space and has {} values; expected one value a voxel",
+                sizes[axis]
+            )));
         }
     }
     let &[i, j, k] = spatial.as_slice() else {
@@ -57,7 +85,27 @@ pub(super) fn grid_of(header: &Header) -> Result<Grid, VolumeFileError> {
     let columns = [i, j, k].map(|axis| directions[axis].expect("a spatial axis has a direction"));
     let [x, y, z] = columns.map(|column| lps * column);
     let lps_from_index = Matrix3x4::from_columns(&[x, y, z, lps * origin]);
-    grid_from_affine(&lps_from_index, dims).map_err(|reason| header.no_place(reason))
+    let grid = grid_from_affine(&lps_from_index, dims).map_err(|reason| header.no_place(reason))?;
+    Ok((grid, layers as usize))
+}
+
+/// True when the first axis is that of a segmentation's layers, as Slicer writes them.
+fn has_layers(header: &Header, directions: &[Option<Vector3<f64>>]) -> bool {
+    let kind = header
+        .get("kinds")
+        .and_then(|k| k.split_whitespace().next());
+    !header.segment_keys.is_empty()
+        && directions.first() == Some(&None)
+        && kind.is_none_or(|kind| kind.eq_ignore_ascii_case("list"))
+}
+
+/// Says that a file of several layers is no label map.
+pub(super) fn overlap(header: &Header, layers: usize) -> VolumeFileError {
+    header.wrong(format!(
+        "its segments overlap: they lie in {layers} layers and a label map has one; in Slicer, export the \
+         segments that are needed as one label map (module Segmentations, Export/import models and \
+         labelmaps) and save that"
+    ))
 }
 
 fn dimensions(header: &Header, sizes: &[i64]) -> VolumeFileError {
@@ -155,17 +203,4 @@ fn check_kinds(
         }
     }
     Ok(())
-}
-
-fn several_values(header: &Header, axis: usize, values: i64) -> VolumeFileError {
-    if !header.segment_keys.is_empty() {
-        return header.wrong(format!(
-            "its segments overlap: they lie in {values} layers and a label map has one; in Slicer, export \
-             the segments that are needed as one label map (module Segmentations, Export/import \
-             models and labelmaps) and save that"
-        ));
-    }
-    header.wrong(format!(
-        "its axis {axis} does not lie in space and has {values} values; expected one value a voxel"
-    ))
 }

@@ -7,10 +7,12 @@
 mod axes;
 mod header;
 mod read;
+mod segmentation;
 mod segments;
 
 pub use read::read_nrrd;
-pub use segments::nrrd_segment_names;
+pub(crate) use segmentation::Segmentation;
+pub use segmentation::nrrd_segment_names;
 
 /// What a file is read as, for messages.
 const FORMAT: &str = "NRRD file (.nrrd or .nhdr)";

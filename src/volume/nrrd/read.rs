@@ -7,6 +7,8 @@ use crate::volume::samples::{ByteOrder, SampleType, volume_of_samples};
 use crate::volume::source;
 use crate::volume::{Volume, VolumeFileError, Voxel};
 use flate2::bufread::MultiGzDecoder;
+use std::fs::File;
+use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
 /// Reads the volume of a `.nrrd` file, or of a `.nhdr` header and the file it names (relative to the
@@ -28,33 +30,57 @@ pub fn read_nrrd<T: Voxel>(path: &Path) -> Result<Volume<T>, VolumeFileError> {
     let grid = grid_of(&header)?;
     let kind = header.sample_type()?;
     let expected = source::raw_bytes(grid.dims, kind, path)?;
-    let (mut file, path) = match data_file(&header)? {
-        Some(path) => (source::open(&path)?, path),
-        None => (attached, path.to_owned()),
-    };
+    let (values, path) = open_values(&header, attached, expected)?;
     let path = path.as_path();
+    let raw = match values {
+        Values::Bytes(mut stream) => source::read_raw(&mut stream, expected, path)?,
+        Values::Text(mut stream) => return source::read_text(grid, &mut stream, (path, FORMAT)),
+    };
+    let order = byte_order(&header, kind)?;
+    volume_of_samples(grid, &raw, (kind, order), (1.0, 0.0), path)
+}
 
-    let lines = not_negative(&header, "line skip")?;
-    source::skip_lines(&mut file, lines, path)?;
+/// The stream of a file's values, from the first.
+pub(super) enum Values {
+    Bytes(Box<dyn Read>),
+    Text(Box<dyn Read>),
+}
+
+/// Opens the values of a file, `expected` bytes unless they are text, and gives the path of the file that
+/// holds them. `attached` is what follows the header.
+///
+/// # Errors
+/// When they lie in several files or are encoded otherwise than raw, by gzip or as text.
+pub(super) fn open_values(
+    header: &Header,
+    attached: BufReader<File>,
+    expected: u64,
+) -> Result<(Values, PathBuf), VolumeFileError> {
+    let (mut file, path) = match data_file(header)? {
+        Some(path) => (source::open(&path)?, path),
+        None => (attached, header.path().to_owned()),
+    };
+    source::skip_lines(&mut file, not_negative(header, "line skip")?, &path)?;
     let encoding = header.needed("encoding")?.to_ascii_lowercase();
-    let raw = match encoding.as_str() {
+    let bytes = || not_negative(header, "byte skip");
+    let values = match encoding.as_str() {
+        // -1: the voxels are the file's last bytes, whatever precedes them.
+        "raw" if header.whole("byte skip", 0)? == -1 => {
+            source::skip_to_last(&mut file, expected, &path)?;
+            Values::Bytes(Box::new(file))
+        }
         "raw" => {
-            // -1: the voxels are the file's last bytes, whatever precedes them.
-            if header.whole("byte skip", 0)? == -1 {
-                source::skip_to_last(&mut file, expected, path)?;
-            } else {
-                source::skip_bytes(&mut file, not_negative(&header, "byte skip")?, path)?;
-            }
-            source::read_raw(&mut file, expected, path)?
+            source::skip_bytes(&mut file, bytes()?, &path)?;
+            Values::Bytes(Box::new(file))
         }
         "gz" | "gzip" => {
             let mut stream = MultiGzDecoder::new(file);
-            source::skip_bytes(&mut stream, not_negative(&header, "byte skip")?, path)?;
-            source::read_raw(&mut stream, expected, path)?
+            source::skip_bytes(&mut stream, bytes()?, &path)?;
+            Values::Bytes(Box::new(stream))
         }
         "txt" | "text" | "ascii" => {
-            source::skip_bytes(&mut file, not_negative(&header, "byte skip")?, path)?;
-            return source::read_text(grid, &mut file, (path, FORMAT));
+            source::skip_bytes(&mut file, bytes()?, &path)?;
+            Values::Text(Box::new(file))
         }
         other => {
             return Err(header.wrong(format!(
@@ -63,8 +89,7 @@ pub fn read_nrrd<T: Voxel>(path: &Path) -> Result<Volume<T>, VolumeFileError> {
             )));
         }
     };
-    let order = byte_order(&header, kind)?;
-    volume_of_samples(grid, &raw, (kind, order), (1.0, 0.0), path)
+    Ok((values, path))
 }
 
 /// The file that holds the voxels, where it is not the header's own.

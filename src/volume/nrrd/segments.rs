@@ -1,81 +1,77 @@
-//! The names of a segmentation's labels.
+//! What a segmentation's header says of its segments.
 
 use super::header::Header;
-use crate::volume::{VolumeFileError, source};
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use crate::volume::VolumeFileError;
+use std::collections::BTreeMap;
 
-/// What a header says of one segment.
-#[derive(Debug, Default)]
-struct Segment {
-    name: Option<String>,
-    label: Option<String>,
-    layer: Option<String>,
+/// One segment: the voxels that have `label` in `layer`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Segment {
+    pub name: String,
+    /// 1 to 255
+    pub label: u8,
+    /// From 0.
+    pub layer: usize,
 }
 
-/// The labels of a segmentation by Slicer with their segments' names, in the order of its segments;
-/// empty for an NRRD file that is no segmentation. Voxels are not read.
+/// The segments of a file with so many layers, by their number, from keys like `Segment12_Name`. Before
+/// labels and layers were written, every segment had a layer of ones for itself, in its order.
 ///
 /// # Errors
-/// When the file is no NRRD file, its segments overlap (lie in several layers), or a segment has no name
-/// or no label from 1 to 255.
-pub fn nrrd_segment_names(path: &Path) -> Result<Vec<(u8, String)>, VolumeFileError> {
-    let header = Header::read(&mut source::open(path)?, path)?;
-    let segments = segments(&header.segment_keys);
-    let layers: BTreeSet<_> = segments.values().flat_map(|s| &s.layer).collect();
-    if layers.len() > 1 {
-        return Err(header.wrong(format!(
-            "its segments overlap: they lie in {} layers and a label map has one; in Slicer, export \
-             the segments that are needed as one label map",
-            layers.len()
-        )));
-    }
-    let alone = segments.len() == 1;
-    let mut names = Vec::new();
-    for (number, segment) in segments {
-        let label = match segment.label.as_deref().map(str::trim) {
-            Some(label) => label,
-            // Before labels were written, every segment had a layer of ones for itself.
-            None if alone => "1",
-            None => "missing",
-        };
-        let label: u8 = label.parse().ok().filter(|&l| l > 0).ok_or_else(|| {
+/// When one has no name, no label from 1 to 255, or a layer that is not there.
+pub(super) fn segments_of(header: &Header, layers: usize) -> Result<Vec<Segment>, VolumeFileError> {
+    let keys = keys_by_number(&header.segment_keys);
+    let own_layers = layers > 1 || keys.len() == 1;
+    let mut segments = Vec::new();
+    for (place, (number, keys)) in keys.iter().enumerate() {
+        let wrong = |key: &str, expected: &str| {
+            let found = keys.get(key).copied().unwrap_or("missing");
             header.wrong(format!(
-                "its Segment{number}_LabelValue is {label}; expected 1 to 255 (save the segmentation again \
-                 with a new Slicer)"
+                "its Segment{number}_{key} is {found}; expected {expected} (save the segmentation again with \
+                 a new Slicer)"
             ))
-        })?;
-        let name = segment
-            .name
+        };
+        let name = keys
+            .get("Name")
             .ok_or_else(|| header.wrong(format!("its header has no Segment{number}_Name")))?;
-        if names.iter().any(|&(other, _)| other == label) {
-            return Err(header.wrong(format!("two of its segments have the label {label}")));
-        }
-        names.push((label, name));
+        let label: Option<u8> = match keys.get("LabelValue") {
+            Some(text) => text.parse().ok(),
+            None => own_layers.then_some(1),
+        };
+        let label = label
+            .filter(|&label| label > 0)
+            .ok_or_else(|| wrong("LabelValue", "1 to 255"))?;
+        let layer: Option<usize> = match keys.get("Layer") {
+            Some(text) => text.parse().ok(),
+            None if layers > 1 => Some(place),
+            None => Some(0),
+        };
+        let layer = layer
+            .filter(|&layer| layer < layers)
+            .ok_or_else(|| wrong("Layer", &format!("0 to {}", layers - 1)))?;
+        segments.push(Segment {
+            name: (*name).to_owned(),
+            label,
+            layer,
+        });
     }
-    Ok(names)
+    Ok(segments)
 }
 
-/// Segments by their number, from keys like `Segment12_Name`.
-fn segments(keys: &BTreeMap<String, String>) -> BTreeMap<u32, Segment> {
-    let mut segments: BTreeMap<u32, Segment> = BTreeMap::new();
+/// What follows `Segment12_`, with its value, by the number.
+fn keys_by_number(keys: &BTreeMap<String, String>) -> BTreeMap<u32, BTreeMap<&str, &str>> {
+    let mut numbers: BTreeMap<u32, BTreeMap<&str, &str>> = BTreeMap::new();
     for (key, value) in keys {
-        let Some((number, what)) = key
+        let numbered = key
             .strip_prefix("Segment")
             .and_then(|rest| rest.split_once('_'))
-        else {
-            continue;
-        };
-        let Ok(number) = number.parse() else {
-            continue;
-        };
-        let segment = segments.entry(number).or_default();
-        match what {
-            "Name" => segment.name = Some(value.clone()),
-            "LabelValue" => segment.label = Some(value.clone()),
-            "Layer" => segment.layer = Some(value.clone()),
-            _ => {}
+            .and_then(|(number, what)| Some((number.parse().ok()?, what)));
+        if let Some((number, what)) = numbered {
+            numbers
+                .entry(number)
+                .or_default()
+                .insert(what, value.trim());
         }
     }
-    segments
+    numbers
 }

@@ -16,7 +16,6 @@
 
 mod folder;
 mod read;
-mod seg_nrrd;
 #[cfg(test)]
 mod tests;
 

@@ -1,9 +1,9 @@
 //! CT and segmentation of a subject.
 
 use super::folder::VsdFiles;
-use super::seg_nrrd::{for_each_voxel, open};
 use crate::anatomy::import::{CtImportError, LabelMeaning, Note};
 use crate::anatomy::{Structure, StructureLabels};
+use crate::volume::nrrd::Segmentation;
 use crate::volume::{Volume, read_volume};
 use std::path::Path;
 
@@ -41,10 +41,10 @@ pub fn read_segmentation(path: &Path) -> Result<(StructureLabels, Vec<Note>), Ct
         path: path.into(),
         reason,
     };
-    let (header, voxels) = open(path).map_err(problem)?;
+    let segmentation = Segmentation::open(path)?;
     // (structure, layer, label) of the bones, in the order in which they have voxels.
     let mut bones: Vec<(Structure, usize, u8)> = Vec::new();
-    for segment in &header.segments {
+    for segment in &segmentation.segments {
         if let Some(LabelMeaning::One(structure)) = LabelMeaning::recognized(&segment.name) {
             bones.push((structure, segment.layer, segment.label));
         }
@@ -56,16 +56,21 @@ pub fn read_segmentation(path: &Path) -> Result<(StructureLabels, Vec<Note>), Ct
         .map(Structure::name)
         .collect();
     if !missing.is_empty() {
-        let names: Vec<&str> = header.segments.iter().map(|s| s.name.as_str()).collect();
+        let names = segmentation.segments.iter().map(|s| s.name.as_str());
+        let names: Vec<&str> = names.collect();
+        let found = match names.as_slice() {
+            [] => "it names none; expected a segmentation saved by 3D Slicer (.seg.nrrd)".into(),
+            names => format!("it has {}", names.join(", ")),
+        };
         return Err(problem(format!(
-            "has no segment of the name {}; it has {}",
-            missing.join(", "),
-            names.join(", ")
+            "has no segment of the name {}; {found}",
+            missing.join(", ")
         )));
     }
     let mut map = Vec::new();
     let mut overlaps = [[0usize; 6]; 6];
-    for_each_voxel(&header, voxels, |labels| {
+    let grid = segmentation.grid.clone();
+    segmentation.for_each_voxel(|labels| {
         let mut there = bones
             .iter()
             .filter(|&&(_, layer, label)| labels[layer] == label);
@@ -76,8 +81,7 @@ pub fn read_segmentation(path: &Path) -> Result<(StructureLabels, Vec<Note>), Ct
             overlaps[usize::from(first.value())][usize::from(second.value())] += 1;
         }
         map.push(first.map_or(0, Structure::value));
-    })
-    .map_err(problem)?;
+    })?;
     let mut notes = Vec::new();
     for first in Structure::ALL {
         for second in Structure::ALL {
@@ -91,7 +95,7 @@ pub fn read_segmentation(path: &Path) -> Result<(StructureLabels, Vec<Note>), Ct
             }
         }
     }
-    let structures = StructureLabels::new(Volume::new(header.grid, map));
+    let structures = StructureLabels::new(Volume::new(grid, map));
     match structures.absent().as_slice() {
         [] => Ok((structures, notes)),
         absent => Err(problem(format!("has no voxel of the {}", absent[0]))),

@@ -1,6 +1,8 @@
 //! Against files that pynrrd wrote (scripts/write_vsd.py).
 
 use super::*;
+use crate::anatomy::import::Note;
+use crate::anatomy::{Side, Structure};
 use crate::geometry::Point;
 use std::path::{Path, PathBuf};
 
@@ -65,6 +67,46 @@ fn both_ways_of_slicer_to_save_segments_are_read() {
     }
 }
 
+/// Slicer of today writes the layer and label of each segment; segments that do not overlap share a layer.
+#[test]
+fn layers_hold_the_segments_that_say_so() {
+    let good = std::fs::read(folder().join(SCAN).join("layers.seg.nrrd")).unwrap();
+    let end = good.windows(2).position(|w| w == b"\n\n").unwrap();
+    let header = std::str::from_utf8(&good[..end]).unwrap();
+    let mut header = header
+        .replace("sizes: 6 3 4 5", "sizes: 2 3 4 5")
+        .replace("gzip", "raw");
+    for (number, layer, label) in [(1, 0, 9), (2, 1, 3), (3, 0, 5), (4, 0, 7), (5, 1, 4)] {
+        header += &format!("\nSegment{number}_Layer:={layer}\nSegment{number}_LabelValue:={label}");
+    }
+    let mut bytes = (header + "\n\n").into_bytes();
+    for n in 0..60 {
+        // The right femur has five voxels of the sacrum as well.
+        bytes.extend(match n % 5 {
+            0 if n < 25 => [9, 4],
+            0 => [9, 0],
+            1 => [0, 3],
+            2 => [5, 0],
+            3 => [7, 0],
+            _ => [0, 4],
+        });
+    }
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), bytes).unwrap();
+    let (read, notes) = read_segmentation(file.path()).unwrap();
+    for (offset, &value) in read.volume().data.iter().enumerate() {
+        assert_eq!(usize::from(value), offset % 5 + 1);
+    }
+    let overlap = Note::Overlap {
+        first: Structure::Sacrum,
+        second: Structure::Femur(Side::Right),
+        voxels: 5,
+    };
+    assert_eq!(notes, [overlap]);
+    let volume = crate::volume::read_volume::<u8>(file.path()).unwrap_err();
+    assert!(volume.to_string().contains("lie in 2 layers"), "{volume}");
+}
+
 #[test]
 fn the_ct_lies_where_pynrrd_put_it() {
     let subject = read_vsd(&find_vsd(&folder()).unwrap()).unwrap();
@@ -93,18 +135,35 @@ fn broken_segmentations_are_refused_with_the_reason() {
         assert!(message.contains(part), "expected '{part}' in: {message}");
         assert!(message.contains("broken.seg.nrrd"), "{message}");
     };
-    says("ends after 60 of 66 voxels", "6 3 4 5", "6 3 2 11");
-    says("no segment of the name hip_left", "Hip_L", "Liver");
-    says("the sizes [3, 4, 5]", "6 3 4 5", "3 4 5");
-    says("expected 2 to 65535", "6 3 4 5", "6 3 1 20");
-    says("does not start as", "NRRD0005", "PNG");
     says(
-        "the space scanner-xyz",
+        "360 bytes of voxel values, 396 expected",
+        "6 3 4 5",
+        "6 3 2 11",
+    );
+    says("no segment of the name hip_left; it has", "Hip_L", "Liver");
+    says("'sizes' are '3 4 5'", "6 3 4 5", "3 4 5");
+    says("lie in 0 layers", "6 3 4 5", "0 3 4 5");
+    says("lie in 5000000 layers", "6 3 4 5", "5000000 3 4 5");
+    says("dimensions [6, 3, 1, 20]", "6 3 4 5", "6 3 1 20");
+    says("axis 0 does not lie in space and has 6", "list", "vector");
+    says("start with NRRD000", "NRRD0005", "PNG");
+    says(
+        "'space' is 'scanner-xyz'",
         "left-posterior-superior",
         "scanner-xyz",
     );
-    says("holds short", "uint8", "short");
-    says("encoded as bzip2", "gzip", "bzip2");
-    says("names no segment", "Segment0_Name", "Other0_Name");
+    says("type short; expected unsigned char", "uint8", "short");
+    says("encoding is 'bzip2'", "gzip", "bzip2");
+    says("labels are text", "gzip", "text");
+    says("no Segment0_Name", "Segment0_Name", "Segment0_Other");
+    says("axis 0 does not lie in space and has 6", "Segment", "Other");
+    says(
+        "Segment2_Layer is 6; expected 0 to 5",
+        "Segment2_Name",
+        "Segment2_Layer:=6\nSegment2_Name",
+    );
     says("not at right angles", "(0,0,2)", "(1,0,2)");
+    let ct = find_vsd(&folder()).unwrap().ct;
+    let message = read_segmentation(&ct).unwrap_err().to_string();
+    assert!(message.contains("it names none"), "{message}");
 }
