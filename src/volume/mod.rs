@@ -8,6 +8,7 @@ mod file_error;
 #[cfg(test)]
 mod format_tests;
 pub mod grid;
+mod header_fields;
 pub mod metaimage;
 pub mod morphology;
 pub mod nifti;

@@ -2,9 +2,9 @@
 
 use super::FORMAT;
 use crate::volume::VolumeFileError;
+use crate::volume::header_fields::HeaderFields;
 use crate::volume::samples::SampleType;
 use crate::volume::source::HeaderLines;
-use std::collections::BTreeMap;
 use std::io::BufRead;
 use std::path::Path;
 
@@ -45,9 +45,7 @@ pub(super) fn is_header_line(line: &str) -> bool {
 /// A header as it is written.
 #[derive(Debug)]
 pub(super) struct Header<'a> {
-    path: &'a Path,
-    /// By the first of a key's names.
-    values: BTreeMap<&'static str, String>,
+    pub fields: HeaderFields<'a>,
 }
 
 impl<'a> Header<'a> {
@@ -57,8 +55,7 @@ impl<'a> Header<'a> {
     /// When a line is none, keys contradict each other, or there is no `ElementDataFile`.
     pub fn read(stream: &mut dyn BufRead, path: &'a Path) -> Result<Self, VolumeFileError> {
         let mut header = Self {
-            path,
-            values: BTreeMap::new(),
+            fields: HeaderFields::new(path, FORMAT),
         };
         let mut lines = HeaderLines::new(path, FORMAT);
         while let Some(line) = lines.next(stream)? {
@@ -67,13 +64,17 @@ impl<'a> Header<'a> {
             }
             let Some((key, value)) = line.split_once('=') else {
                 let start: String = line.chars().take(60).collect();
-                return Err(header.wrong(format!("its header's line '{start}' is not Key = value")));
+                return Err(header
+                    .fields
+                    .wrong(format!("its header's line '{start}' is not Key = value")));
             };
             let (key, value) = (key.trim(), value.trim());
             if let Some(first) = known(key) {
-                let before = header.values.insert(first, value.to_owned());
+                let before = header.fields.insert(first, value);
                 if before.is_some_and(|before| before != value) {
-                    return Err(header.wrong(format!("its header gives two values of '{first}'")));
+                    return Err(header
+                        .fields
+                        .wrong(format!("its header gives two values of '{first}'")));
                 }
             }
             // The voxels may follow at once.
@@ -81,52 +82,23 @@ impl<'a> Header<'a> {
                 return Ok(header);
             }
         }
-        Err(header.wrong("its header has no 'ElementDataFile'".into()))
-    }
-
-    /// A key's value, if it is there.
-    pub fn get(&self, key: &'static str) -> Option<&str> {
-        self.values.get(key).map(String::as_str)
-    }
-
-    /// A key's value.
-    pub fn needed(&self, key: &'static str) -> Result<&str, VolumeFileError> {
-        self.get(key)
-            .ok_or_else(|| self.wrong(format!("its header has no '{key}'")))
-    }
-
-    /// A key's value read as a number, or `default` where it is missing.
-    pub fn number<T: std::str::FromStr>(
-        &self,
-        key: &'static str,
-        default: T,
-    ) -> Result<T, VolumeFileError> {
-        let Some(text) = self.get(key) else {
-            return Ok(default);
-        };
-        text.parse()
-            .map_err(|_| self.wrong(format!("its '{key}' is '{text}'; expected a number")))
+        Err(header
+            .fields
+            .wrong("its header has no 'ElementDataFile'".into()))
     }
 
     /// A key's value read as yes or no, or `default` where it is missing.
     pub fn flag(&self, key: &'static str, default: bool) -> Result<bool, VolumeFileError> {
-        let Some(text) = self.get(key) else {
+        let Some(text) = self.fields.get(key) else {
             return Ok(default);
         };
         match text.to_ascii_lowercase().as_str() {
             "true" | "t" | "1" => Ok(true),
             "false" | "f" | "0" => Ok(false),
-            _ => Err(self.wrong(format!("its '{key}' is '{text}'; expected True or False"))),
+            _ => Err(self
+                .fields
+                .wrong(format!("its '{key}' is '{text}'; expected True or False"))),
         }
-    }
-
-    /// A key's numbers, of which there must be `N`.
-    pub fn numbers<const N: usize>(&self, key: &'static str) -> Result<[f64; N], VolumeFileError> {
-        let text = self.needed(key)?;
-        let numbers: Option<Vec<f64>> = text.split_whitespace().map(|n| n.parse().ok()).collect();
-        numbers
-            .and_then(|n| n.try_into().ok())
-            .ok_or_else(|| self.wrong(format!("its '{key}' is '{text}'; expected {N} numbers")))
     }
 
     /// Voxels along every axis.
@@ -134,29 +106,18 @@ impl<'a> Header<'a> {
     /// # Errors
     /// When there are not three axes of more than one voxel.
     pub fn dims(&self) -> Result<[usize; 3], VolumeFileError> {
-        let text = self.needed("DimSize")?;
-        let sizes: Option<Vec<i64>> = text.split_whitespace().map(|s| s.parse().ok()).collect();
-        let sizes = sizes.ok_or_else(|| {
-            self.wrong(format!("its 'DimSize' is '{text}'; expected whole numbers"))
-        })?;
-        let axes = self.needed("NDims")?;
-        if axes.parse() != Ok(sizes.len()) {
-            return Err(self.wrong(format!("its 'NDims' is {axes} and its 'DimSize' '{text}'")));
-        }
+        let sizes = self.fields.sizes("NDims", "DimSize")?;
         let dims: Option<Vec<usize>> = sizes
             .iter()
             .map(|&d| usize::try_from(d).ok().filter(|&d| d > 1))
             .collect();
         dims.and_then(|dims| dims.try_into().ok())
-            .ok_or_else(|| VolumeFileError::Dimensions {
-                path: self.path.into(),
-                dims: sizes,
-            })
+            .ok_or_else(|| self.fields.dimensions(sizes))
     }
 
     /// The type of the voxels' values.
     pub fn sample_type(&self) -> Result<SampleType, VolumeFileError> {
-        Ok(match self.needed("ElementType")? {
+        Ok(match self.fields.needed("ElementType")? {
             "MET_CHAR" | "MET_ASCII_CHAR" => SampleType::I8,
             "MET_UCHAR" => SampleType::U8,
             "MET_SHORT" => SampleType::I16,
@@ -169,33 +130,9 @@ impl<'a> Header<'a> {
             "MET_FLOAT" => SampleType::F32,
             "MET_DOUBLE" => SampleType::F64,
             found => {
-                return Err(VolumeFileError::DataType {
-                    path: self.path.into(),
-                    found: format!("MetaImage type '{found}'"),
-                });
+                return Err(self.fields.data_type(format!("MetaImage type '{found}'")));
             }
         })
-    }
-
-    /// What is wrong with the header.
-    pub fn wrong(&self, reason: String) -> VolumeFileError {
-        VolumeFileError::Format {
-            path: self.path.into(),
-            format: FORMAT,
-            reason,
-        }
-    }
-
-    /// What is missing of the voxels' place.
-    pub fn no_place(&self, reason: String) -> VolumeFileError {
-        VolumeFileError::Place {
-            path: self.path.into(),
-            reason,
-        }
-    }
-
-    pub fn path(&self) -> &'a Path {
-        self.path
     }
 }
 
@@ -213,10 +150,10 @@ mod tests {
         let text = "ObjectType = Image\r\n\r\nComment = x = y\nPosition = 1 2 3\nOffset = 1 2 3\n\
                     ElementByteOrderMSB = true\nElementDataFile = LOCAL\nDimSize = 9\n";
         let header = header(text).unwrap();
-        assert_eq!(header.numbers("Offset").unwrap(), [1.0, 2.0, 3.0]);
+        assert_eq!(header.fields.numbers("Offset").unwrap(), [1.0, 2.0, 3.0]);
         assert!(header.flag("BinaryDataByteOrderMSB", false).unwrap());
         assert!(!header.flag("CompressedData", false).unwrap());
-        assert_eq!(header.get("DimSize"), None);
+        assert_eq!(header.fields.get("DimSize"), None);
     }
 
     #[test]
@@ -241,7 +178,7 @@ mod tests {
             kind.sample_type(),
             Err(VolumeFileError::DataType { .. })
         ));
-        let numbers = kind.numbers::<3>("Offset").unwrap_err().to_string();
+        let numbers = kind.fields.numbers::<3>("Offset").unwrap_err().to_string();
         assert!(numbers.contains("no 'Offset'"), "{numbers}");
     }
 }

@@ -1,6 +1,7 @@
 //! A grid's place in the world, in a MetaImage header.
 
 use super::header::Header;
+use crate::volume::header_fields::HeaderFields;
 use crate::volume::place::grid_from_affine;
 use crate::volume::{Grid, VolumeFileError};
 use nalgebra::{Matrix3, Matrix3x4, Vector3};
@@ -9,14 +10,20 @@ use nalgebra::{Matrix3, Matrix3x4, Vector3};
 /// then take LPS axes; a header that does so is refused, since its author may have meant any others.
 pub(super) fn grid_of(header: &Header) -> Result<Grid, VolumeFileError> {
     let dims = header.dims()?;
-    check_unit(header)?;
-    let spacing: [f64; 3] = match header.get("ElementSpacing") {
-        Some(_) => header.numbers("ElementSpacing")?,
-        None if header.get("ElementSize").is_some() => header.numbers("ElementSize")?,
-        None => return Err(header.no_place("its header has no 'ElementSpacing'".into())),
+    check_unit(&header.fields)?;
+    let spacing: [f64; 3] = match header.fields.get("ElementSpacing") {
+        Some(_) => header.fields.numbers("ElementSpacing")?,
+        None if header.fields.get("ElementSize").is_some() => {
+            header.fields.numbers("ElementSize")?
+        }
+        None => {
+            return Err(header
+                .fields
+                .no_place("its header has no 'ElementSpacing'".into()));
+        }
     };
     if spacing.iter().any(|&s| s < 0.0) {
-        return Err(header.no_place(format!(
+        return Err(header.fields.no_place(format!(
             "its 'ElementSpacing' is {spacing:?}; expected positive lengths"
         )));
     }
@@ -30,38 +37,35 @@ pub(super) fn grid_of(header: &Header) -> Result<Grid, VolumeFileError> {
             "0 0 0' with the LPS position of its first voxel's centre",
         ),
     ] {
-        if header.get(key).is_none() {
-            return Err(header.no_place(format!(
+        if header.fields.get(key).is_none() {
+            return Err(header.fields.no_place(format!(
                 "its header has no '{key}'; write '{key} = {example}"
             )));
         }
     }
     // The numbers of one axis' direction follow each other: columns, as nalgebra stores them.
-    let direction = Matrix3::from_column_slice(&header.numbers::<9>("TransformMatrix")?);
-    let offset = Vector3::from(header.numbers::<3>("Offset")?);
+    let direction = Matrix3::from_column_slice(&header.fields.numbers::<9>("TransformMatrix")?);
+    let offset = Vector3::from(header.fields.numbers::<3>("Offset")?);
     let axes = direction * Matrix3::from_diagonal(&spacing.into());
     let columns = [0, 1, 2].map(|axis| axes.column(axis).into_owned());
     let lps_from_index = Matrix3x4::from_columns(&[columns[0], columns[1], columns[2], offset]);
-    let grid = grid_from_affine(&lps_from_index, dims).map_err(|r| header.no_place(r))?;
-    if let Some(letters) = header.get("AnatomicalOrientation")
+    let grid = grid_from_affine(&lps_from_index, dims).map_err(|r| header.fields.no_place(r))?;
+    if let Some(letters) = header.fields.get("AnatomicalOrientation")
         && contradicts(letters, &grid.direction)
     {
         tracing::warn!(
             "{} says AnatomicalOrientation = {letters} (where axes come from), which its TransformMatrix \
              contradicts; the matrix is followed",
-            header.path().display()
+            header.fields.path().display()
         );
     }
     Ok(grid)
 }
 
-fn check_unit(header: &Header) -> Result<(), VolumeFileError> {
-    match header.get("DistanceUnits") {
+fn check_unit(fields: &HeaderFields) -> Result<(), VolumeFileError> {
+    match fields.get("DistanceUnits") {
         None | Some("mm" | "?" | "") => Ok(()),
-        Some(unit) => Err(VolumeFileError::Unit {
-            path: header.path().into(),
-            found: format!("'{unit}' (DistanceUnits)"),
-        }),
+        Some(unit) => Err(fields.unit("DistanceUnits", unit)),
     }
 }
 

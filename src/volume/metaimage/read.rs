@@ -3,6 +3,7 @@
 use super::FORMAT;
 use super::header::{Header, is_header_line};
 use super::place::grid_of;
+use crate::volume::header_fields::HeaderFields;
 use crate::volume::samples::{ByteOrder, volume_of_samples};
 use crate::volume::source;
 use crate::volume::{Volume, VolumeFileError, Voxel};
@@ -23,24 +24,26 @@ use std::path::{Path, PathBuf};
 pub fn read_metaimage<T: Voxel>(path: &Path) -> Result<Volume<T>, VolumeFileError> {
     let mut local = source::open(path)?;
     let header = Header::read(&mut local, path)?;
-    check_content(&header)?;
+    check_content(&header.fields)?;
     let grid = grid_of(&header)?;
     let kind = header.sample_type()?;
     let expected = source::raw_bytes(grid.dims, kind, path)?;
     let binary = header.flag("BinaryData", true)?;
     let compressed = header.flag("CompressedData", false)?;
     if compressed && !binary {
-        return Err(header.wrong("its voxels are compressed text; write it anew as binary".into()));
+        return Err(header
+            .fields
+            .wrong("its voxels are compressed text; write it anew as binary".into()));
     }
     let (mut file, path) = data_file(&header, local)?;
     let path = path.as_path();
-    match header.number("HeaderSize", 0)? {
+    match header.fields.whole("HeaderSize", 0)? {
         0 => {}
         // The voxels are the file's last bytes.
         -1 if binary && !compressed => source::skip_to_last(&mut file, expected, path)?,
         size @ 1.. => source::skip_to(&mut file, size as u64, path)?,
         size => {
-            return Err(header.wrong(format!(
+            return Err(header.fields.wrong(format!(
                 "its 'HeaderSize' is {size}; expected 0 or more (or -1 for raw voxels)"
             )));
         }
@@ -69,21 +72,23 @@ pub(in crate::volume) fn is_metaimage(start: &[u8]) -> bool {
 }
 
 /// Refuses what is no image of one value a voxel.
-fn check_content(header: &Header) -> Result<(), VolumeFileError> {
-    match header.get("ObjectType") {
+fn check_content(fields: &HeaderFields) -> Result<(), VolumeFileError> {
+    match fields.get("ObjectType") {
         None | Some("Image") => {}
-        Some(other) => return Err(header.wrong(format!("it holds a '{other}', not an Image"))),
+        Some(other) => {
+            return Err(fields.wrong(format!("it holds a '{other}', not an Image")));
+        }
     }
-    let channels = header.number("ElementNumberOfChannels", 1)?;
+    let channels = fields.whole("ElementNumberOfChannels", 1)?;
     if channels != 1 {
-        return Err(header.wrong(format!(
+        return Err(fields.wrong(format!(
             "it has {channels} values a voxel (ElementNumberOfChannels); expected one"
         )));
     }
-    let slope = header.number("ElementToIntensityFunctionSlope", 1.0)?;
-    let offset = header.number("ElementToIntensityFunctionOffset", 0.0)?;
+    let slope = fields.number("ElementToIntensityFunctionSlope", 1.0)?;
+    let offset = fields.number("ElementToIntensityFunctionOffset", 0.0)?;
     if (slope, offset) != (1.0, 0.0) {
-        return Err(header.wrong(format!(
+        return Err(fields.wrong(format!(
             "its ElementToIntensityFunction is value * {slope} + {offset}, which some programs apply and \
              others do not; write the values themselves and leave it out"
         )));
@@ -96,17 +101,10 @@ fn data_file(
     header: &Header,
     local: BufReader<File>,
 ) -> Result<(BufReader<File>, PathBuf), VolumeFileError> {
-    let name = header.needed("ElementDataFile")?;
+    let name = header.fields.needed("ElementDataFile")?;
     if name.eq_ignore_ascii_case("LOCAL") {
-        return Ok((local, header.path().into()));
+        return Ok((local, header.fields.path().into()));
     }
-    let list = name.split_whitespace().next() == Some("LIST");
-    if name.is_empty() || list || name.contains('%') {
-        return Err(header.wrong(format!(
-            "its voxels lie in several files (ElementDataFile = {name}); write it anew as one .mha file"
-        )));
-    }
-    let folder = header.path().parent().unwrap_or(Path::new(""));
-    let path = folder.join(name);
+    let path = header.fields.data_file("ElementDataFile", name)?;
     Ok((source::open(&path)?, path))
 }

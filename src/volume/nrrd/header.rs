@@ -2,6 +2,7 @@
 
 use super::FORMAT;
 use crate::volume::VolumeFileError;
+use crate::volume::header_fields::HeaderFields;
 use crate::volume::samples::SampleType;
 use crate::volume::source::HeaderLines;
 use std::collections::BTreeMap;
@@ -32,9 +33,8 @@ const SEGMENT_KEYS: &str = "Segment";
 /// A header as it is written.
 #[derive(Debug)]
 pub(super) struct Header<'a> {
-    path: &'a Path,
-    /// By the field's first name, in lower case.
-    fields: BTreeMap<&'static str, String>,
+    /// Names are in lower case.
+    pub fields: HeaderFields<'a>,
     /// `key:=value` lines of a segmentation.
     pub segment_keys: BTreeMap<String, String>,
 }
@@ -46,8 +46,7 @@ impl<'a> Header<'a> {
     /// When it does not start as NRRD, says a field twice, or holds a line that is neither.
     pub fn read(stream: &mut dyn BufRead, path: &'a Path) -> Result<Self, VolumeFileError> {
         let mut header = Self {
-            path,
-            fields: BTreeMap::new(),
+            fields: HeaderFields::new(path, FORMAT),
             segment_keys: BTreeMap::new(),
         };
         let mut lines = HeaderLines::new(path, FORMAT);
@@ -56,9 +55,9 @@ impl<'a> Header<'a> {
             Some("1" | "2" | "3" | "4" | "5" | "6") => {}
             Some(version) => {
                 let reason = format!("its version is '{version}'; this program reads 1 to 6");
-                return Err(header.wrong(reason));
+                return Err(header.fields.wrong(reason));
             }
-            None => return Err(header.wrong("it does not start with NRRD000".into())),
+            None => return Err(header.fields.wrong("it does not start with NRRD000".into())),
         }
         while let Some(line) = lines.next(stream)? {
             if line.is_empty() {
@@ -74,7 +73,7 @@ impl<'a> Header<'a> {
     fn take(&mut self, line: &str) -> Result<(), VolumeFileError> {
         let split = line.split_once(':').ok_or_else(|| {
             let start: String = line.chars().take(60).collect();
-            self.wrong(format!(
+            self.fields.wrong(format!(
                 "its header's line '{start}' is neither a field nor a key"
             ))
         })?;
@@ -94,55 +93,16 @@ impl<'a> Header<'a> {
             other => other,
         };
         if let Some(&name) = FIELDS.iter().find(|&&field| field == name)
-            && self.fields.insert(name, value.trim().to_owned()).is_some()
+            && self.fields.insert(name, value.trim()).is_some()
         {
-            return Err(self.wrong(format!("its header has '{name}' twice")));
+            return Err(self.fields.wrong(format!("its header has '{name}' twice")));
         }
         Ok(())
     }
 
-    /// A field's value, if it is there.
-    pub fn get(&self, field: &'static str) -> Option<&str> {
-        self.fields.get(field).map(String::as_str)
-    }
-
-    /// A field's value.
-    pub fn needed(&self, field: &'static str) -> Result<&str, VolumeFileError> {
-        self.get(field)
-            .ok_or_else(|| self.wrong(format!("its header has no '{field}'")))
-    }
-
-    /// A whole number, or `default` where the field is missing.
-    pub fn whole(&self, field: &'static str, default: i64) -> Result<i64, VolumeFileError> {
-        let Some(text) = self.get(field) else {
-            return Ok(default);
-        };
-        text.parse().map_err(|_| {
-            self.wrong(format!(
-                "its '{field}' is '{text}'; expected a whole number"
-            ))
-        })
-    }
-
-    /// Samples along every axis.
-    pub fn sizes(&self) -> Result<Vec<i64>, VolumeFileError> {
-        let text = self.needed("sizes")?;
-        let sizes: Option<Vec<i64>> = text.split_whitespace().map(|s| s.parse().ok()).collect();
-        let sizes = sizes.ok_or_else(|| {
-            self.wrong(format!("its 'sizes' are '{text}'; expected whole numbers"))
-        })?;
-        let dimension = self.needed("dimension")?;
-        if dimension.parse() != Ok(sizes.len()) {
-            return Err(self.wrong(format!(
-                "its 'dimension' is {dimension} and its 'sizes' are '{text}'"
-            )));
-        }
-        Ok(sizes)
-    }
-
     /// The type of the samples.
     pub fn sample_type(&self) -> Result<SampleType, VolumeFileError> {
-        let found = self.needed("type")?;
+        let found = self.fields.needed("type")?;
         let words: Vec<&str> = found.split_whitespace().collect();
         Ok(match words.join(" ").to_ascii_lowercase().as_str() {
             "signed char" | "int8" | "int8_t" => SampleType::I8,
@@ -170,33 +130,9 @@ impl<'a> Header<'a> {
             "float" => SampleType::F32,
             "double" => SampleType::F64,
             _ => {
-                return Err(VolumeFileError::DataType {
-                    path: self.path.into(),
-                    found: format!("NRRD type '{found}'"),
-                });
+                return Err(self.fields.data_type(format!("NRRD type '{found}'")));
             }
         })
-    }
-
-    /// What is wrong with the header.
-    pub fn wrong(&self, reason: String) -> VolumeFileError {
-        VolumeFileError::Format {
-            path: self.path.into(),
-            format: FORMAT,
-            reason,
-        }
-    }
-
-    /// What is missing of the voxels' place.
-    pub fn no_place(&self, reason: String) -> VolumeFileError {
-        VolumeFileError::Place {
-            path: self.path.into(),
-            reason,
-        }
-    }
-
-    pub fn path(&self) -> &'a Path {
-        self.path
     }
 }
 
@@ -233,11 +169,11 @@ mod tests {
                     content: a: b\r\nSegment0_Name:=one:=two\\\\ \\n three\r\nother:=x\r\n\r\nsizes: 1";
         let header = header(text).unwrap();
         assert_eq!(header.sample_type().unwrap(), SampleType::U8);
-        assert_eq!(header.whole("line skip", 0).unwrap(), 3);
-        assert_eq!(header.whole("byte skip", -1).unwrap(), -1);
+        assert_eq!(header.fields.whole("line skip", 0).unwrap(), 3);
+        assert_eq!(header.fields.whole("byte skip", -1).unwrap(), -1);
         assert_eq!(header.segment_keys.len(), 1);
         assert_eq!(header.segment_keys["Segment0_Name"], "one:=two\\ \n three");
-        assert_eq!(header.get("sizes"), None);
+        assert_eq!(header.fields.get("sizes"), None);
     }
 
     /// The format's definition lists these names of each type.
@@ -294,7 +230,14 @@ mod tests {
             &format!("NRRD0004\n{}", "#\n".repeat(1 << 20)),
             "does not end",
         );
-        let sizes = |text: &str| header(text).unwrap().sizes().unwrap_err().to_string();
+        let sizes = |text: &str| {
+            header(text)
+                .unwrap()
+                .fields
+                .sizes("dimension", "sizes")
+                .unwrap_err()
+                .to_string()
+        };
         assert!(sizes("NRRD0004\ndimension: 3\nsizes: 3 4\n").contains("'dimension' is 3"));
         assert!(sizes("NRRD0004\ndimension: 3\nsizes: 3 4 1e9\n").contains("whole numbers"));
     }

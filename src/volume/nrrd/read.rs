@@ -3,6 +3,7 @@
 use super::FORMAT;
 use super::axes::grid_of;
 use super::header::Header;
+use crate::volume::header_fields::HeaderFields;
 use crate::volume::samples::{ByteOrder, SampleType, volume_of_samples};
 use crate::volume::source;
 use crate::volume::{Volume, VolumeFileError, Voxel};
@@ -36,7 +37,7 @@ pub fn read_nrrd<T: Voxel>(path: &Path) -> Result<Volume<T>, VolumeFileError> {
         Values::Bytes(mut stream) => source::read_raw(&mut stream, expected, path)?,
         Values::Text(mut stream) => return source::read_text(grid, &mut stream, (path, FORMAT)),
     };
-    let order = byte_order(&header, kind)?;
+    let order = byte_order(&header.fields, kind)?;
     volume_of_samples(grid, &raw, (kind, order), (1.0, 0.0), path)
 }
 
@@ -56,16 +57,16 @@ pub(super) fn open_values(
     attached: BufReader<File>,
     expected: u64,
 ) -> Result<(Values, PathBuf), VolumeFileError> {
-    let (mut file, path) = match data_file(header)? {
+    let (mut file, path) = match data_file(&header.fields)? {
         Some(path) => (source::open(&path)?, path),
-        None => (attached, header.path().to_owned()),
+        None => (attached, header.fields.path().to_owned()),
     };
-    source::skip_lines(&mut file, not_negative(header, "line skip")?, &path)?;
-    let encoding = header.needed("encoding")?.to_ascii_lowercase();
-    let bytes = || not_negative(header, "byte skip");
+    source::skip_lines(&mut file, not_negative(&header.fields, "line skip")?, &path)?;
+    let encoding = header.fields.needed("encoding")?.to_ascii_lowercase();
+    let bytes = || not_negative(&header.fields, "byte skip");
     let values = match encoding.as_str() {
         // -1: the voxels are the file's last bytes, whatever precedes them.
-        "raw" if header.whole("byte skip", 0)? == -1 => {
+        "raw" if header.fields.whole("byte skip", 0)? == -1 => {
             source::skip_to_last(&mut file, expected, &path)?;
             Values::Bytes(Box::new(file))
         }
@@ -83,7 +84,7 @@ pub(super) fn open_values(
             Values::Text(Box::new(file))
         }
         other => {
-            return Err(header.wrong(format!(
+            return Err(header.fields.wrong(format!(
                 "its encoding is '{other}'; write it anew as raw or gzip (Slicer, pynrrd and teem's \
                  unu save do so)"
             )));
@@ -93,32 +94,25 @@ pub(super) fn open_values(
 }
 
 /// The file that holds the voxels, where it is not the header's own.
-fn data_file(header: &Header) -> Result<Option<PathBuf>, VolumeFileError> {
-    let Some(name) = header.get("data file") else {
+fn data_file(fields: &HeaderFields) -> Result<Option<PathBuf>, VolumeFileError> {
+    let Some(name) = fields.get("data file") else {
         return Ok(None);
     };
-    let list = name.split_whitespace().next() == Some("LIST");
-    if name.is_empty() || list || name.contains('%') {
-        return Err(header.wrong(format!(
-            "its voxels lie in several files ('data file: {name}'); write it anew as one .nrrd file"
-        )));
-    }
-    let folder = header.path().parent().unwrap_or(Path::new(""));
-    Ok(Some(folder.join(name)))
+    fields.data_file("data file", name).map(Some)
 }
 
-fn not_negative(header: &Header, field: &'static str) -> Result<u64, VolumeFileError> {
-    let number = header.whole(field, 0)?;
+fn not_negative(fields: &HeaderFields, field: &'static str) -> Result<u64, VolumeFileError> {
+    let number = fields.whole(field, 0)?;
     u64::try_from(number)
-        .map_err(|_| header.wrong(format!("its '{field}' is {number}; expected 0 or more")))
+        .map_err(|_| fields.wrong(format!("its '{field}' is {number}; expected 0 or more")))
 }
 
-fn byte_order(header: &Header, kind: SampleType) -> Result<ByteOrder, VolumeFileError> {
-    match header.get("endian").map(str::to_ascii_lowercase).as_deref() {
+fn byte_order(fields: &HeaderFields, kind: SampleType) -> Result<ByteOrder, VolumeFileError> {
+    match fields.get("endian").map(str::to_ascii_lowercase).as_deref() {
         Some("little") => Ok(ByteOrder::Little),
         Some("big") => Ok(ByteOrder::Big),
         None if kind.size() == 1 => Ok(ByteOrder::Little),
-        other => Err(header.wrong(format!(
+        other => Err(fields.wrong(format!(
             "its 'endian' is '{}'; expected little or big",
             other.unwrap_or_default()
         ))),

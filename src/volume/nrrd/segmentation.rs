@@ -57,16 +57,18 @@ impl<'a> Segmentation<'a> {
         let header = &self.header;
         let kind = header.sample_type()?;
         if kind != SampleType::U8 {
-            return Err(header.wrong(format!(
+            return Err(header.fields.wrong(format!(
                 "its segments' labels are of the type {}; expected unsigned char, as Slicer writes them",
-                header.needed("type")?
+                header.fields.needed("type")?
             )));
         }
-        let voxels = source::raw_bytes(self.grid.dims, kind, header.path())?;
+        let voxels = source::raw_bytes(self.grid.dims, kind, header.fields.path())?;
         // Voxels are fewer than 2^63 and layers than 2^13: no file has so many bytes, and none is asked for.
         let expected = voxels.saturating_mul(self.layers as u64);
         let Values::Bytes(stream) = open_values(header, self.attached, expected)?.0 else {
-            return Err(header.wrong("its segments' labels are text; write it anew as gzip".into()));
+            return Err(header
+                .fields
+                .wrong("its segments' labels are text; write it anew as gzip".into()));
         };
         let mut stream = BufReader::with_capacity(BUFFER_BYTES, stream);
         let mut labels = vec![0u8; self.layers];
@@ -75,12 +77,12 @@ impl<'a> Segmentation<'a> {
                 Ok(()) => voxel(&labels),
                 Err(error) if error.kind() == ErrorKind::UnexpectedEof => {
                     return Err(VolumeFileError::Truncated {
-                        path: header.path().into(),
+                        path: header.fields.path().into(),
                         found: n * self.layers as u64,
                         expected,
                     });
                 }
-                Err(error) => return Err(source::unreadable(header.path())(error)),
+                Err(error) => return Err(source::unreadable(header.fields.path())(error)),
             }
         }
         Ok(())
@@ -100,12 +102,14 @@ pub fn nrrd_segment_names(path: &Path) -> Result<Vec<(u8, String)>, VolumeFileEr
         ..
     } = Segmentation::open(path)?;
     if layers > 1 {
-        return Err(overlap(&header, layers));
+        return Err(overlap(&header.fields, layers));
     }
     let mut names: Vec<(u8, String)> = Vec::new();
     for Segment { label, name, .. } in segments {
         if names.iter().any(|&(other, _)| other == label) {
-            return Err(header.wrong(format!("two of its segments have the label {label}")));
+            return Err(header
+                .fields
+                .wrong(format!("two of its segments have the label {label}")));
         }
         names.push((label, name));
     }

@@ -26,14 +26,16 @@ pub(super) fn segments_of(header: &Header, layers: usize) -> Result<Vec<Segment>
     for (place, (number, keys)) in keys.iter().enumerate() {
         let wrong = |key: &str, expected: &str| {
             let found = keys.get(key).copied().unwrap_or("missing");
-            header.wrong(format!(
+            header.fields.wrong(format!(
                 "its Segment{number}_{key} is {found}; expected {expected} (save the segmentation again with \
                  a new Slicer)"
             ))
         };
-        let name = keys
-            .get("Name")
-            .ok_or_else(|| header.wrong(format!("its header has no Segment{number}_Name")))?;
+        let name = keys.get("Name").ok_or_else(|| {
+            header
+                .fields
+                .wrong(format!("its header has no Segment{number}_Name"))
+        })?;
         let label: Option<u8> = match keys.get("LabelValue") {
             Some(text) => text.parse().ok(),
             None => own_layers.then_some(1),

@@ -141,7 +141,7 @@ fn broken_segmentations_are_refused_with_the_reason() {
         "6 3 2 11",
     );
     says("no segment of the name hip_left; it has", "Hip_L", "Liver");
-    says("'sizes' are '3 4 5'", "6 3 4 5", "3 4 5");
+    says("'sizes' '3 4 5'", "6 3 4 5", "3 4 5");
     says("lie in 0 layers", "6 3 4 5", "0 3 4 5");
     says("lie in 5000000 layers", "6 3 4 5", "5000000 3 4 5");
     says("dimensions [6, 3, 1, 20]", "6 3 4 5", "6 3 1 20");
