@@ -502,4 +502,10 @@ fn a_ct_with_a_label_map_is_imported_and_proved() {
     check(&at("made"), 0);
     let (_, refused) = import("2", 1);
     assert!(refused.contains("exists already"), "{refused}");
+    let mut command = pao_sim();
+    command.args(["specimen", "import", "labels"]);
+    command.args([at("ct.nii.gz"), at("map.nii.gz")]);
+    let (_, refused) = said(command.arg("--out").arg(at("without")), 1);
+    assert!(refused.contains("does not name its values"), "{refused}");
+    assert!(refused.contains("give a table"), "{refused}");
 }

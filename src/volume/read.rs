@@ -5,7 +5,7 @@ use super::metaimage::{is_metaimage, read_metaimage};
 use super::nifti::{is_nifti, read_nifti};
 use super::nrrd::read_nrrd;
 use super::samples::voxel_of;
-use super::{Volume, VolumeFileError, Voxel, source};
+use super::{Volume, VolumeFileError, Voxel, nrrd, source};
 use std::io::Read;
 use std::path::Path;
 
@@ -62,7 +62,7 @@ fn read_series<T: Voxel>(path: &Path) -> Result<Volume<T>, VolumeFileError> {
 }
 
 fn by_content(start: &[u8]) -> Option<Format> {
-    if start.starts_with(b"NRRD000") {
+    if start.starts_with(nrrd::START) {
         Some(Format::Nrrd)
     } else if is_nifti(start) {
         Some(Format::Nifti)

@@ -31,10 +31,19 @@ pub(super) fn open(path: &Path) -> Result<BufReader<File>, VolumeFileError> {
     File::open(path).map(BufReader::new).map_err(io)
 }
 
+/// True when what comes next starts with these few bytes.
+pub(super) fn starts_with(
+    stream: &mut dyn BufRead,
+    bytes: &[u8],
+    path: &Path,
+) -> Result<bool, VolumeFileError> {
+    let start = stream.fill_buf().map_err(unreadable(path))?;
+    Ok(start.starts_with(bytes))
+}
+
 /// True when what comes next starts as gzip does.
 pub(super) fn is_gzip(stream: &mut dyn BufRead, path: &Path) -> Result<bool, VolumeFileError> {
-    let start = stream.fill_buf().map_err(unreadable(path))?;
-    Ok(start.starts_with(&[0x1f, 0x8b]))
+    starts_with(stream, &[0x1f, 0x8b], path)
 }
 
 /// Lines of a text header.

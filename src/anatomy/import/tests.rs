@@ -1,6 +1,6 @@
 //! One body through each importer: the same voxels and landmarks must come out.
 
-use super::labels::{LabelTable, read_label_table, structures_of_labels};
+use super::labels::{LabelTable, label_table_of_segments, read_label_table, structures_of_labels};
 use super::totalseg::{TotalsegVersion, read_totalseg};
 use super::*;
 use crate::anatomy::phantom::{PhantomParameters, phantom_structures};
@@ -262,6 +262,35 @@ fn seg_nrrd(structures: &StructureLabels) -> Vec<u8> {
     let mut bytes = (header + "\n").into_bytes();
     bytes.extend(&structures.volume().data);
     bytes
+}
+
+#[test]
+fn a_segmentation_by_slicer_is_its_own_table() {
+    let (_, structures) = &*BODY;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.seg.nrrd");
+    let bytes = seg_nrrd(structures);
+    std::fs::write(&path, &bytes).unwrap();
+    let table = label_table_of_segments(&path).unwrap();
+    let (read, notes) = structures_of_labels(&read_volume(&path).unwrap(), &table).unwrap();
+    assert_eq!((&read, notes), (structures, vec![]));
+
+    let says = |from: &str, to: &str, parts: &[&str]| {
+        let end = bytes.windows(2).position(|w| w == b"\n\n").unwrap();
+        let header = std::str::from_utf8(&bytes[..end]).unwrap();
+        assert!(header.contains(from), "{header}");
+        std::fs::write(&path, header.replace(from, to) + "\n\n").unwrap();
+        let message = label_table_of_segments(&path).unwrap_err().to_string();
+        for part in ["map.seg.nrrd"].iter().chain(parts) {
+            assert!(message.contains(part), "expected '{part}' in: {message}");
+        }
+    };
+    let names = "segments (Sacrum, Os, Hip_R, Femur_L, Femur_R) no value is hip_left";
+    says("Hip_L", "Os", &[names, "or give a table"]);
+    let unnamed = ["does not name its values", "give a table"];
+    says("Segment", "Part", &unnamed);
+    says("NRRD0004", "other", &unnamed);
+    says("LabelValue:=2", "LabelValue:=1", &["have the label 1"]);
 }
 
 #[test]

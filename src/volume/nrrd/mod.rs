@@ -16,3 +16,6 @@ pub use segmentation::nrrd_segment_names;
 
 /// What a file is read as, for messages.
 const FORMAT: &str = "NRRD file (.nrrd or .nhdr)";
+
+/// What every file starts with; a digit follows.
+pub(super) const START: &[u8] = b"NRRD000";

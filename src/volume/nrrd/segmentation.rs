@@ -3,6 +3,7 @@
 //! Layers lie beside each other voxel by voxel, so a file is decoded as it is read and never held as a
 //! whole.
 
+use super::START;
 use super::axes::{layered_grid_of, overlap};
 use super::header::Header;
 use super::read::{Values, open_values};
@@ -90,11 +91,15 @@ impl<'a> Segmentation<'a> {
 }
 
 /// The labels of a segmentation by Slicer with their segments' names, in the order of its segments;
-/// empty for an NRRD file that is no segmentation. Voxels are not read.
+/// empty for an NRRD file that is no segmentation, and for a file of another format. Voxels are not read.
 ///
 /// # Errors
-/// As [`Segmentation::open`] has them, and when segments overlap (lie in several layers) or two have one label.
+/// When an NRRD file has not three dimensions in space, does not say where it lies in LPS, RAS or LAS mm, its
+/// segments overlap (lie in several layers), or one has no name or no label from 1 to 255 for itself.
 pub fn nrrd_segment_names(path: &Path) -> Result<Vec<(u8, String)>, VolumeFileError> {
+    if !source::starts_with(&mut source::open(path)?, START, path)? {
+        return Ok(Vec::new());
+    }
     let Segmentation {
         layers,
         segments,

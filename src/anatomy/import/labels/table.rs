@@ -1,6 +1,7 @@
 //! The table of a label map: which value is which bone.
 
 use crate::anatomy::import::{CtImportError, LabelMeaning};
+use crate::volume::nrrd_segment_names;
 use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::Path;
@@ -115,6 +116,35 @@ pub fn read_label_table(path: &Path) -> Result<LabelTable, CtImportError> {
             path: path.into(),
             reason,
         })
+}
+
+/// The table of a label map that is a segmentation by 3D Slicer (`.seg.nrrd`): its segments' names, recognized
+/// as [`LabelMeaning::recognized`] says.
+///
+/// # Errors
+/// When the file cannot be read, names no segments, they overlap, or the bones are not all there once.
+pub fn label_table_of_segments(path: &Path) -> Result<LabelTable, CtImportError> {
+    let problem = |reason: String| CtImportError::File {
+        path: path.into(),
+        reason,
+    };
+    let names = nrrd_segment_names(path)?;
+    if names.is_empty() {
+        return Err(problem(
+            "does not name its values, as a segmentation by 3D Slicer (.seg.nrrd) does; give a table of them"
+                .into(),
+        ));
+    }
+    let entries = names
+        .iter()
+        .filter_map(|(label, name)| Some((*label, LabelMeaning::recognized(name)?)));
+    LabelTable::new(entries).map_err(|reason| {
+        let names: Vec<&str> = names.iter().map(|(_, name)| name.as_str()).collect();
+        problem(format!(
+            "by the names of its segments ({}) {reason}; rename them in 3D Slicer, or give a table",
+            names.join(", ")
+        ))
+    })
 }
 
 fn entries(text: &str) -> Result<Vec<(u8, LabelMeaning)>, String> {

@@ -19,7 +19,8 @@ pub enum From {
     /// From a CT and what TotalSegmentator made of it: a folder with one mask a structure, or one file
     /// of all (task total).
     Totalseg(totalseg::Arguments),
-    /// From a CT, a label map and a table that says which value is which bone.
+    /// From a CT, a label map and a table that says which value is which bone; a segmentation by 3D Slicer
+    /// (.seg.nrrd) names its values itself.
     Labels(labels::Arguments),
     /// From the HDF5 file (full resolution) of the DeepFluoro data set.
     Deepfluoro(deepfluoro::Arguments),
