@@ -14,7 +14,7 @@ use pao_sim::anatomy::detect::detect;
 use pao_sim::anatomy::import::deepfluoro::read_deepfluoro;
 use pao_sim::anatomy::import::labels::{read_label_table, structures_of_labels};
 use pao_sim::anatomy::import::totalseg::read_totalseg;
-use pao_sim::anatomy::import::vsd::read_segmentation;
+use pao_sim::anatomy::import::vsd::{find_vsd, read_vsd};
 use pao_sim::anatomy::import::{
     CtImport, CtImportParameters, CtOrigin, Imported, specimen_from_ct,
 };
@@ -28,7 +28,7 @@ use pao_sim::anatomy::{
 };
 use pao_sim::geometry::Point;
 use pao_sim::volume::resample::resample_labels;
-use pao_sim::volume::{Grid, Volume, read_volume, write_nifti};
+use pao_sim::volume::{Grid, Volume, dice, read_volume, write_nifti};
 use std::path::Path;
 use std::process::Command;
 
@@ -48,16 +48,6 @@ fn imported(ct: Volume<i16>, structures: StructureLabels, landmarks: Landmarks) 
         notes: vec![],
     };
     specimen_from_ct(import, &CtImportParameters::default()).unwrap()
-}
-
-/// 2 |A and B| / (|A| + |B|)
-fn dice(a: &Volume<u8>, b: &Volume<u8>, label: u8) -> f64 {
-    let pairs = || a.data.iter().zip(&b.data);
-    let both = pairs()
-        .filter(|(x, y)| **x == label && **y == label)
-        .count();
-    let each = pairs().map(|(x, y)| usize::from(*x == label) + usize::from(*y == label));
-    2.0 * both as f64 / each.sum::<usize>() as f64
 }
 
 fn farthest(a: &Landmarks, b: &Landmarks) -> f64 {
@@ -135,10 +125,16 @@ fn every_importer_gives_the_same_specimen() {
             "write_vsd.py",
             &[&at("vsd"), &at("body"), &at("bones.nii.gz"), Path::new("x")],
         );
-        let inner = at("vsd").join("SMIR.x");
-        let (segments, _) =
-            read_segmentation(&inner.join("SMIR.x.Pelvis-Thighs_Reconstruction.seg.nrrd")).unwrap();
-        assert!(segments.volume().data == read.volume().data, "{subject}");
+        let files = find_vsd(&at("vsd")).unwrap();
+        assert!(files.ct.ends_with("SMIR.x.Pelvis-Thighs.nrrd"));
+        let vsd = read_vsd(&files).unwrap();
+        assert!(
+            vsd.structures.volume().data == read.volume().data,
+            "{subject}"
+        );
+        assert!(vsd.ct.data == ct.data, "{subject}");
+        let from_vsd = imported(vsd.ct, vsd.structures, Landmarks::default()).specimen;
+        assert!(from_vsd.ct.data == written.ct.data && from_vsd.labels.data == written.labels.data);
 
         python(
             "write_deepfluoro.py",

@@ -8,7 +8,7 @@ use crate::anatomy::{
     Landmark, Landmarks, Side, Specimen, Structure, StructureLabels, specimen_problems,
 };
 use crate::geometry::Vector;
-use crate::volume::{Grid, Volume, read_volume, write_nifti};
+use crate::volume::{Grid, Volume, dice, read_volume, write_nifti};
 use std::path::Path;
 use std::sync::LazyLock;
 
@@ -67,16 +67,6 @@ fn assert_same(found: &Specimen, expected: &Specimen) {
     assert!(found.labels.data == expected.labels.data, "labels");
     assert_eq!(found.landmarks, expected.landmarks);
     assert_eq!(found.rims, expected.rims);
-}
-
-/// 2 |A and B| / (|A| + |B|) of one label of two maps on one grid.
-fn dice(a: &Volume<u8>, b: &Volume<u8>, label: u8) -> f64 {
-    let pairs = || a.data.iter().zip(&b.data);
-    let both = pairs()
-        .filter(|(x, y)| **x == label && **y == label)
-        .count();
-    let each = pairs().map(|(x, y)| usize::from(*x == label) + usize::from(*y == label));
-    2.0 * both as f64 / each.sum::<usize>() as f64
 }
 
 #[test]
@@ -241,27 +231,32 @@ fn label_maps_with_tables_give_the_same() {
     assert_same(&made(body.ct.clone(), read, notes).specimen, &DIRECT);
 }
 
-/// As Slicer saves it: uncropped, and uncompressed so that it can be written here by hand.
-fn seg_nrrd(structures: &StructureLabels) -> Vec<u8> {
-    let Grid { dims, origin, .. } = structures.volume().grid;
-    let mut header = format!(
-        "NRRD0004\ntype: unsigned char\ndimension: 3\nspace: right-anterior-superior\n\
+/// An uncompressed NRRD file, written here by hand. `keys` are further lines of its header.
+fn nrrd(grid: &Grid, kind: &str, keys: &str, voxels: &[u8]) -> Vec<u8> {
+    let Grid { dims, origin, .. } = grid;
+    let header = format!(
+        "NRRD0004\ntype: {kind}\ndimension: 3\nspace: right-anterior-superior\n\
          sizes: {} {} {}\nspace directions: (-{VOXEL_MM},0,0) (0,-{VOXEL_MM},0) (0,0,{VOXEL_MM})\n\
-         kinds: domain domain domain\nencoding: raw\nspace origin: ({},{},{})\n",
+         kinds: domain domain domain\nencoding: raw\nspace origin: ({},{},{})\n{keys}\n",
         dims[0], dims[1], dims[2], -origin.x, -origin.y, origin.z
     );
+    [header.as_bytes(), voxels].concat()
+}
+
+/// As Slicer saves it, but uncropped.
+fn seg_nrrd(structures: &StructureLabels) -> Vec<u8> {
+    let mut keys = String::new();
     for (n, name) in ["Sacrum", "Hip_L", "Hip_R", "Femur_L", "Femur_R"]
         .iter()
         .enumerate()
     {
-        header += &format!(
+        keys += &format!(
             "Segment{n}_Name:={name}\nSegment{n}_LabelValue:={}\n",
             n + 1
         );
     }
-    let mut bytes = (header + "\n").into_bytes();
-    bytes.extend(&structures.volume().data);
-    bytes
+    let map = structures.volume();
+    nrrd(&map.grid, "unsigned char", &keys, &map.data)
 }
 
 #[test]
@@ -296,16 +291,27 @@ fn a_segmentation_by_slicer_is_its_own_table() {
 #[test]
 fn a_subject_of_vsd_gives_the_same() {
     let (body, structures) = &*BODY;
-    let folder = tempfile::tempdir().unwrap();
-    let file = |name: &str| folder.path().join(name);
-    write_nifti(&body.ct, &file("a.nii.gz")).unwrap();
-    std::fs::write(file("a_Reconstruction.seg.nrrd"), seg_nrrd(structures)).unwrap();
-    let read = vsd::read_vsd(&vsd::find_vsd(folder.path()).unwrap()).unwrap();
-    assert_eq!(&read.structures, structures);
-    assert_same(
-        &made(read.ct, read.structures, read.notes).specimen,
-        &DIRECT,
-    );
+    let hu: Vec<u8> = body.ct.data.iter().flat_map(|v| v.to_le_bytes()).collect();
+    let cts = [
+        (
+            "a.nrrd",
+            nrrd(&body.ct.grid, "short", "endian: little\n", &hu),
+        ),
+        ("a.nii.gz", vec![]),
+    ];
+    for (name, ct) in cts {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str| folder.path().join(name);
+        match ct.as_slice() {
+            [] => write_nifti(&body.ct, &file(name)).unwrap(),
+            bytes => std::fs::write(file(name), bytes).unwrap(),
+        }
+        std::fs::write(file("a_Reconstruction.seg.nrrd"), seg_nrrd(structures)).unwrap();
+        let read = vsd::read_vsd(&vsd::find_vsd(folder.path()).unwrap()).unwrap();
+        assert_eq!(&read.structures, structures);
+        let made = made(read.ct, read.structures, read.notes);
+        assert_same(&made.specimen, &DIRECT);
+    }
 }
 
 #[test]

@@ -101,7 +101,7 @@ fn check_kind(data: &DataSet) -> Result<(), VolumeFileError> {
     equals(
         tags::MODALITY,
         "CT",
-        "only a CT has the Hounsfield units that radiographs are made from",
+        "only a CT has the Hounsfield units that radiographs are made from; name the folder of a CT series",
     )?;
     let class = data.text(tags::SOP_CLASS_UID).unwrap_or_default();
     let frames = data.whole(tags::NUMBER_OF_FRAMES)?.unwrap_or(1);
@@ -120,7 +120,8 @@ fn check_kind(data: &DataSet) -> Result<(), VolumeFileError> {
     match data.whole(tags::SAMPLES_PER_PIXEL)? {
         Some(1) => {}
         Some(n) => {
-            let expected = "1: a picture in colour has no Hounsfield units";
+            let expected =
+                "1: a picture in colour has no Hounsfield units; export the original series";
             return Err(data.unexpected(tags::SAMPLES_PER_PIXEL, &n.to_string(), expected));
         }
         None => return Err(data.missing(tags::SAMPLES_PER_PIXEL, "export the original series")),
