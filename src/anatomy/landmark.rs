@@ -91,6 +91,12 @@ impl Landmarks {
         self.points.insert((landmark, side), (point, from));
     }
 
+    /// Sets every landmark that `others` has, and how it came to be known.
+    pub fn set_all(&mut self, others: &Self) {
+        self.points
+            .extend(others.points.iter().map(|(&key, &of)| (key, of)));
+    }
+
     /// One landmark, or `None` if the specimen lacks it.
     pub fn get(&self, landmark: Landmark, side: Side) -> Option<Point> {
         self.points.get(&(landmark, side)).map(|of| of.0)

@@ -20,6 +20,18 @@ pub struct LandmarkOverrides {
     pub ignored: Vec<String>,
 }
 
+impl LandmarkOverrides {
+    /// The names of the landmarks and rims, for people.
+    pub fn names(&self) -> Vec<String> {
+        let landmarks = self.landmarks.iter().map(|(l, side, _)| l.key(side));
+        let rims = Side::BOTH
+            .into_iter()
+            .filter(|side| self.rims[side.index()].is_some())
+            .map(|side| format!("{side} rim"));
+        landmarks.chain(rims).collect()
+    }
+}
+
 /// Reads the landmarks and rims that a file names ([`super::names`] is the rule).
 ///
 /// A rim is a closed curve named as one, or points named as one and numbered along it; numbers may

@@ -7,33 +7,41 @@ use pao_sim::anatomy::import::{
     CtImport, CtImportParameters, CtOrigin, Imported, Note, specimen_from_ct,
 };
 use pao_sim::anatomy::landmark_files::{LandmarkOverrides, read_landmark_overrides};
-use pao_sim::anatomy::{Landmarks, Specimen, SpecimenError, StructureLabels, write_specimen};
+use pao_sim::anatomy::{Landmarks, SpecimenError, StructureLabels, write_specimen};
 use pao_sim::volume::{Volume, read_dicom_series_of, read_volume};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Flags of every importer that starts from a CT.
+/// Flags of every importer.
 #[derive(Debug, clap::Args)]
-pub struct Target {
+pub struct Given {
     /// The specimen's folder; it must not be there yet
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
-    /// The specimen's name: letters, digits and -. Default: the name of the specimen's folder
+    /// The specimen's name: letters, digits and -. Default: the name of the specimen's folder, or of that
+    /// of the surfaces, where it also keys the texture of the bone
     #[arg(long)]
-    name: Option<String>,
-    /// male, female or unknown
+    pub name: Option<String>,
+    /// male, female or unknown. Default: as the data say
     #[arg(long)]
-    sex: Option<String>,
-    /// Licence of the CT
+    pub sex: Option<String>,
+    /// Licence of the data. Default: as they say
     #[arg(long)]
-    licence: Option<String>,
-    /// Where CT and segmentation come from
+    pub licence: Option<String>,
+    /// Where the data come from. Default: as they say
     #[arg(long, value_name = "TEXT")]
-    from: Option<String>,
+    pub from: Option<String>,
     /// Landmarks and rims that people placed (.fcsv, .mrk.json, .csv); they replace those of the data and
     /// those found by rule
     #[arg(long, value_name = "FILE")]
     landmarks: Option<PathBuf>,
+}
+
+/// Flags of every importer that starts from a CT.
+#[derive(Debug, clap::Args)]
+pub struct Target {
+    #[command(flatten)]
+    given: Given,
     /// Edge of the specimen's voxels
     #[arg(long, value_name = "MM", default_value_t = 1.0)]
     voxel_mm: f64,
@@ -84,31 +92,58 @@ pub struct Read {
     pub notes: Vec<Note>,
 }
 
-impl Target {
+impl Given {
     /// Says so when the folder is there: what takes a minute is not begun for nothing.
     pub fn check(&self) -> Result<(), Failure> {
-        check_free(&self.out)
+        match self.out.exists() {
+            true => Err(SpecimenError::Exists(self.out.clone()).into()),
+            false => Ok(()),
+        }
+    }
+
+    /// What the landmark file gives; a note for each of its points that means nothing. Nothing without a file.
+    pub fn landmarks(&self, notes: &mut Vec<Note>) -> Result<LandmarkOverrides, Failure> {
+        let Some(file) = &self.landmarks else {
+            return Ok(LandmarkOverrides::default());
+        };
+        let given = read_landmark_overrides(file)?;
+        let told = |line| Note::Reader(format!("{}: {line}", file.display()));
+        notes.extend(given.ignored.iter().map(told));
+        Ok(given)
+    }
+
+    /// Writes the specimen and tells about it.
+    pub fn write(&self, made: &Imported, common: &Common) -> Result<Exit, Failure> {
+        write_specimen(&made.specimen, &self.out)?;
+        tell(made, &self.out, common);
+        Ok(Exit::Complete)
+    }
+}
+
+impl Target {
+    /// As [`Given::check`].
+    pub fn check(&self) -> Result<(), Failure> {
+        self.given.check()
     }
 
     /// Makes the specimen, writes it and tells about it.
     pub fn finish(&self, read: Read, known: Known, common: &Common) -> Result<Exit, Failure> {
+        let given = &self.given;
         let (mut landmarks, mut notes) = (read.landmarks, read.notes);
-        let given = given(self.landmarks.as_deref(), &mut notes)?;
-        for (landmark, side, point) in given.landmarks.iter() {
-            landmarks.set(landmark, side, point);
-        }
+        let overrides = given.landmarks(&mut notes)?;
+        landmarks.set_all(&overrides.landmarks);
         let flag = |flag: &Option<String>, known: String| flag.clone().unwrap_or(known);
         let import = CtImport {
             ct: read.ct,
             structures: read.structures,
             landmarks,
-            rims: given.rims,
+            rims: overrides.rims,
             origin: CtOrigin {
                 kind: known.kind,
-                name: self.name.clone().unwrap_or_else(|| folder_name(&self.out)),
-                sex: flag(&self.sex, known.sex),
-                licence: flag(&self.licence, known.licence),
-                from: flag(&self.from, known.from),
+                name: flag(&given.name, folder_name(&given.out)),
+                sex: flag(&given.sex, known.sex),
+                licence: flag(&given.licence, known.licence),
+                from: flag(&given.from, known.from),
             },
             notes,
         };
@@ -116,29 +151,7 @@ impl Target {
             voxel_mm: self.voxel_mm,
             ..Default::default()
         };
-        let Imported { specimen, notes } = specimen_from_ct(import, &parameters)?;
-        write_specimen(&specimen, &self.out)?;
-        tell(&specimen, &self.out, &notes, common);
-        Ok(Exit::Complete)
-    }
-}
-
-/// What a landmark file gives; a note for each of its points that means nothing. Nothing without a file.
-pub fn given(file: Option<&Path>, notes: &mut Vec<Note>) -> Result<LandmarkOverrides, Failure> {
-    let Some(file) = file else {
-        return Ok(LandmarkOverrides::default());
-    };
-    let given = read_landmark_overrides(file)?;
-    let told = |line| Note::Reader(format!("{}: {line}", file.display()));
-    notes.extend(given.ignored.iter().map(told));
-    Ok(given)
-}
-
-/// An error when the folder exists.
-pub fn check_free(out: &Path) -> Result<(), Failure> {
-    match out.exists() {
-        true => Err(SpecimenError::Exists(out.to_owned()).into()),
-        false => Ok(()),
+        given.write(&specimen_from_ct(import, &parameters)?, common)
     }
 }
 
@@ -151,7 +164,8 @@ pub fn folder_name(path: &Path) -> String {
 }
 
 /// Prints what was made, and every note.
-pub fn tell(specimen: &Specimen, folder: &Path, notes: &[Note], common: &Common) {
+fn tell(made: &Imported, folder: &Path, common: &Common) {
+    let Imported { specimen, notes } = made;
     let [i, j, k] = specimen.ct.grid.dims;
     let mm = specimen.ct.grid.spacing[0];
     let notes: Vec<String> = notes.iter().map(ToString::to_string).collect();
