@@ -110,7 +110,7 @@ fn a_spacing_that_changes_slowly_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let mut z = 30.0;
         for k in 0..10 {
-            let slice = replaced(&bytes, "32.500000", &format!("{z:.6}"));
+            let slice = replaced(&bytes, "32.500000", format!("{z:.6}"));
             std::fs::write(folder.path().join(format!("{k}")), slice).unwrap();
             z += 1.25 + growth * f64::from(k);
         }
