@@ -181,6 +181,18 @@ impl Surface {
         (0..self.triangles.len()).map(half).sum()
     }
 
+    /// The part of the area that each vertex stands for (mm^2): a third of its triangles'.
+    pub fn vertex_areas(&self) -> Vec<f64> {
+        let mut areas = vec![0.0; self.vertices.len()];
+        for (t, triangle) in self.triangles.iter().enumerate() {
+            let third = area_vector(&self.corners(t)).norm() / 6.0;
+            for &v in triangle {
+                areas[v as usize] += third;
+            }
+        }
+        areas
+    }
+
     /// Enclosed volume in mm^3, by the divergence theorem; positive for outward triangles.
     pub fn volume(&self) -> f64 {
         let Some(&start) = self.vertices.first() else {

@@ -1,11 +1,20 @@
 //! The shadow of a bone: its parallel projection as a picture of bone and background.
 
-use crate::geometry::{Point, Ray, Vector};
+use super::spot::{middle, nearness, outward};
+use crate::geometry::{Point, Vector};
 use crate::volume::Surface;
-use nalgebra::Vector2;
+use nalgebra::{Vector1, Vector2};
 
 /// Size of a pixel of the picture (mm).
 const PIXEL_MM: f64 = 0.25;
+
+/// Bone up to this far inside the edge, and this far beside a place on it, tells how deep in the view the edge
+/// lies there (mm).
+const EDGE_MM: f64 = 2.0;
+const BESIDE_MM: f64 = 5.0;
+
+/// How far inside the edge the bone is thick enough to be met for sure (mm).
+const INSET_MM: f64 = 0.5;
 
 /// Background left free around the shadow (pixels).
 const MARGIN: usize = 8;
@@ -137,22 +146,28 @@ impl<'a> Outline<'a> {
         })
     }
 
-    /// The point of the bone's surface that casts the edge of the shadow at (u, v): a line of sight
-    /// just inside the edge passes through bone most briefly there.
-    pub fn surface_point(&self, inside_edge: &Vector2<f64>) -> Option<Point> {
-        const BEYOND_MM: f64 = 1000.0;
+    /// The point of the bone's surface that casts the edge of the shadow at (u, v), where `inward` (unit) points into
+    /// the shadow: in the depth of view, the middle of the bone near there that reaches nearly to the edge; from
+    /// just inside, the surface is met outward.
+    pub fn surface_point(&self, edge: &Vector2<f64>, inward: &Vector2<f64>) -> Option<Point> {
         let [u, v, view] = self.axes;
-        let on_plane = self.origin + u * inside_edge.x + v * inside_edge.y;
-        let ray = Ray {
-            origin: on_plane - view * BEYOND_MM,
-            direction: view,
-        };
-        let hits = self.surface.intersections(&ray);
-        let middle = hits
-            .windows(2)
-            .filter(|pair| pair[0].entering && !pair[1].entering)
-            .min_by(|a, b| (a[1].t - a[0].t).total_cmp(&(b[1].t - b[0].t)))
-            .map(|pair| ray.at((pair[0].t + pair[1].t) / 2.0))?;
-        self.surface.closest_point(&middle).map(|(point, _)| point)
+        let areas = self.surface.vertex_areas();
+        let depths = self.surface.vertices().iter().zip(&areas).map(|(p, area)| {
+            let d = p - self.origin;
+            let at = Vector2::new(d.dot(&u), d.dot(&v)) - edge;
+            let beside = (at.x * inward.y - at.y * inward.x) / BESIDE_MM;
+            let within = at.dot(inward);
+            // Beyond the edge lies bone of the hole's other side.
+            let near = match within > -BESIDE_MM {
+                true => nearness(within, EDGE_MM) * (1.0 - beside * beside).max(0.0),
+                false => 0.0,
+            };
+            (Vector1::new(d.dot(&view)), area * near)
+        });
+        let depth = middle(depths)?.x;
+        let inside = edge + inward * INSET_MM;
+        let inside = self.origin + u * inside.x + v * inside.y + view * depth;
+        let direction = -(u * inward.x + v * inward.y);
+        outward(self.surface, &inside, &direction)
     }
 }

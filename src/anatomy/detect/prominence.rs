@@ -1,7 +1,7 @@
-//! Bony prominences: the extreme point of a region in one direction.
+//! Bony prominences: the tip of a region in one direction.
 
 use super::local::{Local, forward};
-use super::spot::{FLAT_MM, Spot};
+use super::spot::{Spot, tip};
 use super::{DetectError, Head};
 use crate::anatomy::Side;
 use crate::geometry::{Point, Vector};
@@ -68,29 +68,16 @@ pub(super) fn prominences(
     }
 }
 
-/// The vertex farthest along `direction` among those for which `region`, the distance from the
-/// region's border (mm), is positive; `None` when it lies at the border. As good are those that
-/// reach nearly as far: a blunt spine is uncertain along its blunt end.
+/// The tip along `direction` of the bone for which `region`, the distance from the region's border (mm), is
+/// positive; `None` when its foremost vertex lies at the border.
 fn extreme(
     hip: &Surface,
     local: &Local,
     direction: Vector,
     region: &dyn Fn(&Vector) -> f64,
 ) -> Option<Spot> {
-    let reaches = |point: &Point| {
-        let p = local.coordinates(point);
-        let inside = region(&p);
-        (inside > 0.0).then(|| (p.dot(&direction), inside))
-    };
-    let mut best: Option<(f64, f64, Point)> = None;
-    for point in hip.vertices() {
-        if let Some((reach, inside)) = reaches(point)
-            && best.is_none_or(|(farthest, ..)| reach > farthest)
-        {
-            best = Some((reach, inside, *point));
-        }
-    }
-    let (farthest, _, point) = best.filter(|&(_, inside, _)| inside > BORDER_MM)?;
-    let as_far = |p: &&Point| reaches(p).is_some_and(|(reach, _)| reach >= farthest - FLAT_MM);
-    Some(Spot::among(point, hip.vertices().iter().filter(as_far)))
+    let eligible = |p: &Point| region(&local.coordinates(p)) > 0.0;
+    let tip = tip(hip, &local.direction(&direction), eligible)?;
+    let inside = region(&local.coordinates(&hip.vertices()[tip.foremost]));
+    (inside > BORDER_MM).then_some(tip.spot)
 }
