@@ -3,11 +3,14 @@
 use crate::cli::args::Common;
 use crate::cli::error::{Exit, Failure};
 use crate::cli::output::say;
+use pao_sim::anatomy::detect::Given;
 use pao_sim::anatomy::import::{
-    CtImport, CtImportParameters, CtOrigin, Imported, Note, specimen_from_ct,
+    CtImport, CtImportError, CtImportParameters, CtOrigin, Imported, Note, specimen_from_ct,
 };
-use pao_sim::anatomy::landmark_files::{LandmarkOverrides, read_landmark_overrides};
-use pao_sim::anatomy::{Landmarks, Specimen, SpecimenError, StructureLabels, write_specimen};
+use pao_sim::anatomy::landmark_files::{
+    LandmarkOverrides, PointsFileError, read_landmark_overrides, write_markups,
+};
+use pao_sim::anatomy::{Landmarks, Side, Specimen, SpecimenError, StructureLabels, write_specimen};
 use pao_sim::volume::{Volume, read_dicom_series_of, read_volume};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -34,6 +37,10 @@ pub struct Target {
     /// those found by rule
     #[arg(long, value_name = "FILE")]
     landmarks: Option<PathBuf>,
+    /// Write landmarks and rims there for 3D Slicer, whether or not all were found: those that are missing are
+    /// points without a position, to be placed and given by --landmarks. Named .mrk.json; it must not be there yet
+    #[arg(long, value_name = "FILE")]
+    draft_landmarks: Option<PathBuf>,
     /// Edge of the specimen's voxels
     #[arg(long, value_name = "MM", default_value_t = 1.0)]
     voxel_mm: f64,
@@ -87,6 +94,12 @@ pub struct Read {
 impl Target {
     /// Says so when the folder is there: what takes a minute is not begun for nothing.
     pub fn check(&self) -> Result<(), Failure> {
+        if let Some(draft) = &self.draft_landmarks {
+            check_markups_name("--draft-landmarks", draft)?;
+            if draft.exists() {
+                return Err(PointsFileError::Exists(draft.clone()).into());
+            }
+        }
         check_free(&self.out)
     }
 
@@ -101,8 +114,10 @@ impl Target {
         let import = CtImport {
             ct: read.ct,
             structures: read.structures,
-            landmarks,
-            rims: given.rims,
+            given: Given {
+                landmarks,
+                rims: given.rims,
+            },
             origin: CtOrigin {
                 kind: known.kind,
                 name: self.name.clone().unwrap_or_else(|| folder_name(&self.out)),
@@ -116,10 +131,43 @@ impl Target {
             voxel_mm: self.voxel_mm,
             ..Default::default()
         };
-        let Imported { specimen, notes } = specimen_from_ct(import, &parameters)?;
+        let made = specimen_from_ct(import, &parameters);
+        self.write_draft(&made)?;
+        let Imported { specimen, notes } = made?;
         write_specimen(&specimen, &self.out)?;
         tell(&specimen, &self.out, &notes, common);
         Ok(Exit::Complete)
+    }
+
+    /// What was found for 3D Slicer, also where that is not all.
+    fn write_draft(&self, made: &Result<Imported, CtImportError>) -> Result<(), Failure> {
+        let Some(draft) = &self.draft_landmarks else {
+            return Ok(());
+        };
+        let (landmarks, rims) = match made {
+            Ok(Imported { specimen, .. }) => (
+                &specimen.landmarks,
+                Side::BOTH.map(|side| specimen.rim(side)),
+            ),
+            Err(CtImportError::Landmarks(unfound)) => {
+                let rim = |side: Side| unfound.rims[side.index()].as_deref();
+                let points = |side| rim(side).map_or(&[][..], Vec::as_slice);
+                (&unfound.landmarks, Side::BOTH.map(points))
+            }
+            Err(_) => return Ok(()),
+        };
+        Ok(write_markups(landmarks, rims, draft)?)
+    }
+}
+
+/// Says so when a file for 3D Slicer is named otherwise: Slicer tells what a file is by its name.
+pub fn check_markups_name(flag: &str, path: &Path) -> Result<(), Failure> {
+    match path.to_string_lossy().ends_with(".mrk.json") {
+        true => Ok(()),
+        false => Err(Failure::Usage(format!(
+            "{flag} is {}; expected a name that ends with .mrk.json",
+            path.display()
+        ))),
     }
 }
 
