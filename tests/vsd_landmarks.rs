@@ -161,7 +161,8 @@ fn landmarks_bear_thick_slices_and_mirror_each_other() {
                 }
             }
             for side in Side::BOTH {
-                let (mean, most) = apart(&again.rims[side.index()], &found.rims[side.index()]);
+                let rim = |of: &Detected| of.rims[side.index()].clone().unwrap();
+                let (mean, most) = apart(&rim(&again), &rim(&found));
                 line.push(format!("{side} rim {mean:.1} (most {most:.1})"));
             }
             println!("{subject} {thickness} mm slices: {}", line.join(", "));
