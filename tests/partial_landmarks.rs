@@ -8,6 +8,9 @@ use pao_sim::anatomy::import::labels::{read_label_table, structures_of_labels};
 use pao_sim::anatomy::import::{
     CtImport, CtImportError, CtImportParameters, CtOrigin, Imported, specimen_from_ct,
 };
+use pao_sim::anatomy::surfaces::{
+    ImportError, SurfacesOrigin, SurfacesParameters, specimen_from_surfaces_with,
+};
 use pao_sim::anatomy::{
     Found, Landmark, Landmarks, PhantomParameters, Side, Specimen, Structure, StructureLabels,
     phantom_structures, read_specimen,
@@ -202,6 +205,53 @@ fn a_given_head_carries_what_rests_on_it() {
         missing(&found),
         ["ASIS_l", "AIIS_l", "FH_l", "GSN_l", "left rim"]
     );
+}
+
+/// Body and density need heads, of the bones or of people.
+#[test]
+fn surfaces_without_a_head_take_a_given_one() {
+    let head = |side| WHOLE.landmarks.get(Landmark::Fh, side).unwrap();
+    let cut = |sides: &[Side]| {
+        let values: Vec<u8> = sides.iter().map(|s| Structure::Femur(*s).value()).collect();
+        let low = head(Side::Left).z.min(head(Side::Right).z) - 30.0;
+        surfaces(&changed(|value, at| {
+            match values.contains(&value) && at.z > low {
+                true => 0,
+                false => value,
+            }
+        }))
+    };
+    let origin = SurfacesOrigin::of_folder(Path::new("nowhere"), "body").unwrap();
+    let parameters = SurfacesParameters {
+        voxel_mm: 2.0,
+        ..Default::default()
+    };
+    let made = |bones: &BoneSurfaces, given: &Given| {
+        specimen_from_surfaces_with(bones, &origin, &parameters, given)
+    };
+    let one = cut(&[Side::Left]);
+    let mut given = Given::default();
+    match made(&one, &given).unwrap_err() {
+        ImportError::Landmarks(unfound) => assert_eq!(unfound.missing.len(), 9),
+        other => panic!("{other}"),
+    }
+    given
+        .landmarks
+        .set(Landmark::Fh, Side::Left, head(Side::Left));
+    let body = made(&one, &given).unwrap();
+    let from = |side| body.specimen.landmarks.provenance(Landmark::Fh, side);
+    let found = Side::BOTH.map(|side| from(side).unwrap().found.unwrap());
+    assert_eq!(found, [Found::Given, Found::Detected]);
+    assert_eq!(body.notes.len(), 2, "{:?}", body.notes);
+
+    let all = Given {
+        landmarks: WHOLE.landmarks.clone(),
+        rims: WHOLE.rims.clone().map(|rim| rim.map(|rim| rim.to_vec())),
+    };
+    let error = made(&cut(&Side::BOTH), &all).unwrap_err();
+    let message = error.to_string();
+    assert!(matches!(error, ImportError::Heads(_)), "{message}");
+    assert!(message.contains("left femoral head") && message.contains("right"));
 }
 
 /// As a user does: refused, completed in Slicer, taken.
