@@ -56,7 +56,7 @@ fn compare(body: &Specimen, masks: &Masks) -> Vec<(String, f64, f64)> {
             }
         }
         for side in Side::BOTH {
-            let (mean, most) = apart(&found.rims[side.index()], body.rim(side));
+            let (mean, most) = apart(found.rims[side.index()].as_ref().unwrap(), body.rim(side));
             line.push(format!("{side} rim {mean:.1} (most {most:.1})"));
         }
         println!("{}, {thickness} mm slices: {}", body.name, line.join(", "));
@@ -108,7 +108,7 @@ fn everything_found_says_how_surely() {
         }
     }
     for rim in &found.rims {
-        let mm = rim.provenance.uncertainty_mm.unwrap();
+        let mm = rim.as_ref().unwrap().provenance.uncertainty_mm.unwrap();
         assert!((0.2..6.0).contains(&mm), "{mm}");
     }
 }

@@ -10,7 +10,7 @@
 mod data;
 
 use data::SUBJECTS;
-use pao_sim::anatomy::detect::detect;
+use pao_sim::anatomy::detect::{Given, detect};
 use pao_sim::anatomy::import::deepfluoro::read_deepfluoro;
 use pao_sim::anatomy::import::labels::{read_label_table, structures_of_labels};
 use pao_sim::anatomy::import::totalseg::read_totalseg;
@@ -36,8 +36,10 @@ fn imported(ct: Volume<i16>, structures: StructureLabels, landmarks: Landmarks) 
     let import = CtImport {
         ct,
         structures,
-        landmarks,
-        rims: [None, None],
+        given: Given {
+            landmarks,
+            rims: [None, None],
+        },
         origin: CtOrigin {
             kind: "labels",
             name: "body".into(),
@@ -232,7 +234,7 @@ fn landmarks_are_found_in_thick_slices() {
                 low = low.coords.inf(&p.coords).into();
                 high = high.coords.sup(&p.coords).into();
             }
-            low.z = low.z.max(reference.heads[0].center.z - 160.0);
+            low.z = low.z.max(reference.heads[0].unwrap().center.z - 160.0);
             let margin = pao_sim::geometry::Vector::new(10.37, 10.21, 10.43);
             let extent = (low - margin, high + margin);
             let of = |grid: &Grid| structures_from_surfaces(&surfaces, grid);

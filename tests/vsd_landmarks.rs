@@ -55,8 +55,14 @@ fn landmarks_lie_where_raters_place_them() {
             ) in [
                 ("ASIS", at(Landmark::Asis)),
                 ("AIIS", at(Landmark::Aiis)),
-                ("Pubic Tubercle (PT)", found.pubic_tubercles[side.index()]),
-                ("Ischial Spine (IS)", found.ischial_spines[side.index()]),
+                (
+                    "Pubic Tubercle (PT)",
+                    found.pubic_tubercles[side.index()].unwrap(),
+                ),
+                (
+                    "Ischial Spine (IS)",
+                    found.ischial_spines[side.index()].unwrap(),
+                ),
             ] {
                 let (mean, sd) = raters(&all, subject, side, name);
                 let (distance, limit) = ((point - mean).norm(), (2.0 * sd).max(5.0));
@@ -72,8 +78,8 @@ fn landmarks_lie_where_raters_place_them() {
                     ));
                 }
             }
-            let head = found.heads[side.index()];
-            let rim = &found.rims[side.index()];
+            let head = found.heads[side.index()].unwrap();
+            let rim = found.rims[side.index()].as_ref().unwrap();
             println!(
                 "{subject} {side} head radius {:.2} rms {:.2} mm, {} vertices; rim {} points, {:.1} mm",
                 head.radius_mm,
@@ -155,7 +161,8 @@ fn landmarks_bear_thick_slices_and_mirror_each_other() {
                 }
             }
             for side in Side::BOTH {
-                let (mean, most) = apart(&again.rims[side.index()], &found.rims[side.index()]);
+                let rim = |of: &Detected| of.rims[side.index()].clone().unwrap();
+                let (mean, most) = apart(&rim(&again), &rim(&found));
                 line.push(format!("{side} rim {mean:.1} (most {most:.1})"));
             }
             println!("{subject} {thickness} mm slices: {}", line.join(", "));

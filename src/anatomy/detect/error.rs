@@ -4,7 +4,7 @@ use crate::anatomy::Side;
 
 /// Why landmarks or rims could not be found. The bones then differ from what the rules expect:
 /// bones of the wrong side, in another frame, incomplete, or of unusual shape.
-#[derive(Debug, thiserror::Error)]
+#[derive(Clone, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DetectError {
     #[error("the two hip bones have no left-right axis: their centres are {apart_mm:.1} mm apart")]
@@ -29,5 +29,13 @@ pub enum DetectError {
         what: &'static str,
         side: Side,
         reason: String,
+    },
+    /// It was not sought: what its rule starts from is missing.
+    #[error("the {side} {what} rests on what is missing: {on}")]
+    Rests {
+        what: &'static str,
+        side: Side,
+        /// What that is, and why it is missing where nothing else says so.
+        on: String,
     },
 }

@@ -44,6 +44,20 @@ pub struct Head {
     pub uncertainty_mm: f64,
 }
 
+impl Head {
+    /// A head as large as this one about a centre that a person placed. It has no vertices of its own,
+    /// and nobody knows how sure its centre is.
+    pub(super) fn about(&self, center: Point) -> Self {
+        Self {
+            center,
+            radius_mm: self.radius_mm,
+            rms_mm: f64::NAN,
+            vertices: 0,
+            uncertainty_mm: f64::NAN,
+        }
+    }
+}
+
 /// Fits a sphere to the part of the head that faces away from the neck: least squares over the
 /// vertices in a band about the sphere, which narrows from 5 to 1 mm while the fit settles.
 ///

@@ -127,8 +127,9 @@ fn trace(
         .collect())
 }
 
-/// The direction from the head's centre into the socket: the mean direction of the bone around it.
-fn socket_axis(hip: &Surface, head: &Head) -> Option<Vector> {
+/// The direction from the head's centre into the socket: the mean direction of the bone around it. A
+/// sphere without any is no head.
+pub(super) fn socket_axis(hip: &Surface, head: &Head) -> Option<Vector> {
     let mut sum = Vector::zeros();
     for t in 0..hip.triangles().len() {
         let corners = hip.corners(t);

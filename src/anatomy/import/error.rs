@@ -1,7 +1,7 @@
 //! Why a CT and its segmentation could not be made a specimen.
 
 use crate::anatomy::Structure;
-use crate::anatomy::detect::DetectError;
+use crate::anatomy::detect::Unfound;
 use crate::volume::VolumeFileError;
 use std::path::PathBuf;
 
@@ -36,13 +36,9 @@ pub enum CtImportError {
     )]
     SidesSwapped { what: &'static str, apart_mm: f64 },
     #[error(
-        "cannot find the landmarks on the segmentation: {error}; still missing: {}. Look at the segmentation there, or give these in a landmark file",
-        .missing.join(", ")
+        "cannot find the landmarks on the segmentation. Neither found nor given are:\n{0}\nLook at the segmentation there; or place these in 3D Slicer, in the file of all others that --draft-landmarks FILE.mrk.json writes, and give them by --landmarks FILE (docs/formats.md, Points)"
     )]
-    Landmarks {
-        error: DetectError,
-        missing: Vec<String>,
-    },
+    Landmarks(#[from] Box<Unfound>),
     #[error("{0}")]
     Labels(String),
 }

@@ -25,4 +25,5 @@ pub use names::LabelMeaning;
 pub use note::Note;
 pub use origin::CtOrigin;
 pub use parameters::CtImportParameters;
+pub(in crate::anatomy) use specimen::told;
 pub use specimen::{CtImport, Imported, specimen_from_ct};

@@ -32,8 +32,8 @@ pub enum Note {
         "the {structure} ends {found_mm:.0} mm below its head; a study wants 150 mm, and its shaft will be missing in images that show more"
     )]
     ShortFemur { structure: Structure, found_mm: f64 },
-    #[error("not found by rule: {0}; what the landmark file says is taken")]
-    NotDetected(String),
+    #[error("not found by rule: {names} ({reason}); what was given is taken")]
+    NotDetected { names: String, reason: String },
     #[error("taken from the landmark file: {0}")]
     Overridden(String),
     #[error("{0}")]

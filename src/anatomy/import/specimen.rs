@@ -6,11 +6,9 @@ use super::grid::{Lattice, around_bones, check_overlap, same_grid};
 use super::note::Note;
 use super::origin::CtOrigin;
 use super::parameters::CtImportParameters;
-use crate::anatomy::detect::{BoneSurfaces, detect};
-use crate::anatomy::{
-    Landmark, Landmarks, Rim, Side, Source, Specimen, Structure, StructureLabels,
-};
-use crate::geometry::{Point, Vector};
+use crate::anatomy::detect::{BoneSurfaces, Detected, Given, Marks, by_reason, detect_with};
+use crate::anatomy::{Landmark, Landmarks, Side, Source, Specimen, Structure, StructureLabels};
+use crate::geometry::Vector;
 use crate::volume::resample::resample_labels;
 use crate::volume::{Grid, Volume};
 
@@ -28,10 +26,8 @@ pub struct CtImport {
     pub ct: Volume<i16>,
     /// The bones, on any grid of the same world.
     pub structures: StructureLabels,
-    /// Points of a landmark file; they replace what is found by rule.
-    pub landmarks: Landmarks,
-    /// Rims of a landmark file, by [`Side::index`].
-    pub rims: [Option<Vec<Point>>; 2],
+    /// Of a landmark file, or of the data; they replace what is found by rule.
+    pub given: Given,
     pub origin: CtOrigin,
     /// What the reader met.
     pub notes: Vec<Note>,
@@ -54,8 +50,8 @@ pub struct Imported {
 ///    and labels get onto the lattice by [`crate::volume::resample`].
 ///
 /// # Errors
-/// When a bone is absent, CT and labels do not overlap, sides are swapped, or a landmark is neither
-/// found nor given.
+/// When a bone is absent, CT and labels do not overlap, sides are swapped, or landmarks or rims are neither
+/// found nor given ([`CtImportError::Landmarks`] has those that are).
 pub fn specimen_from_ct(
     import: CtImport,
     parameters: &CtImportParameters,
@@ -88,7 +84,8 @@ pub fn specimen_from_ct(
     let bones = StructureLabels::new(resample_labels(structures.volume(), &near));
     check_present(&bones)?;
     let surfaces = bones.surfaces(&parameters.surface);
-    let marks = marks(&surfaces, &import.landmarks, &import.rims, &mut notes)?;
+    let marks = marks(&surfaces, &import.given)?;
+    notes.extend(told(&marks));
 
     let (min, max) = ends(lattice.grid(), &surfaces, &marks.landmarks, parameters);
     let ct = lattice.ct(&import.ct, min, max);
@@ -149,54 +146,22 @@ fn check_sides(structures: &StructureLabels) -> Result<(), CtImportError> {
     Ok(())
 }
 
-struct Marks {
-    landmarks: Landmarks,
-    rims: [Rim; 2],
-    /// Names of those that were given.
-    given: Vec<String>,
+/// Landmarks and rims: found by rule, and the given ones in their place.
+fn marks(surfaces: &BoneSurfaces, given: &Given) -> Result<Marks, CtImportError> {
+    let found = detect_with(surfaces, &given.landmarks);
+    let found = found.unwrap_or_else(|error| Detected::nothing(&error));
+    Ok(found.completed(given)?)
 }
 
-/// Landmarks and rims: found by rule where none is given.
-fn marks(
-    surfaces: &BoneSurfaces,
-    landmarks: &Landmarks,
-    rims: &[Option<Vec<Point>>; 2],
-    notes: &mut Vec<Note>,
-) -> Result<Marks, CtImportError> {
-    let mut given: Vec<String> = landmarks.iter().map(|(l, side, _)| l.key(side)).collect();
-    for side in Side::BOTH {
-        given.extend(rims[side.index()].is_some().then(|| format!("{side} rim")));
+/// What was given, and why that had to be.
+pub(in crate::anatomy) fn told(marks: &Marks) -> Vec<Note> {
+    let mut notes = Vec::new();
+    if !marks.given.is_empty() {
+        notes.push(Note::Overridden(marks.given.join(", ")));
     }
-    if !given.is_empty() {
-        notes.push(Note::Overridden(given.join(", ")));
-    }
-    let (mut all, found) = match detect(surfaces) {
-        Ok(found) => (found.landmarks, found.rims.map(Some)),
-        Err(error) => {
-            let mut missing = landmarks.missing();
-            for side in Side::BOTH {
-                missing.extend(rims[side.index()].is_none().then(|| format!("{side} rim")));
-            }
-            if !missing.is_empty() {
-                return Err(CtImportError::Landmarks { error, missing });
-            }
-            notes.push(Note::NotDetected(error.to_string()));
-            (Landmarks::default(), [None, None])
-        }
-    };
-    for (landmark, side, point) in landmarks.iter() {
-        all.set(landmark, side, point);
-    }
-    let [left, right] = found;
-    let rim = |side: Side, found: Option<Rim>| {
-        let given = rims[side.index()].clone().map(Rim::from);
-        given.or(found).unwrap_or_default()
-    };
-    Ok(Marks {
-        landmarks: all,
-        rims: [rim(Side::Left, left), rim(Side::Right, right)],
-        given,
-    })
+    let not_found = by_reason(&marks.not_found).into_iter();
+    notes.extend(not_found.map(|(names, reason)| Note::NotDetected { names, reason }));
+    notes
 }
 
 /// The lattice's voxels that a study needs, both ends included: all of the width and depth.

@@ -3,10 +3,9 @@
 use super::labels::{LabelTable, label_table_of_segments, read_label_table, structures_of_labels};
 use super::totalseg::{TotalsegVersion, read_totalseg};
 use super::*;
+use crate::anatomy::detect::Given;
 use crate::anatomy::phantom::{PhantomParameters, phantom_structures};
-use crate::anatomy::{
-    Landmark, Landmarks, Side, Specimen, Structure, StructureLabels, specimen_problems,
-};
+use crate::anatomy::{Landmark, Side, Specimen, Structure, StructureLabels, specimen_problems};
 use crate::geometry::Vector;
 use crate::volume::{Grid, Volume, dice, read_volume, write_nifti};
 use std::path::Path;
@@ -43,8 +42,7 @@ fn import(ct: Volume<i16>, structures: StructureLabels, notes: Vec<Note>) -> CtI
     CtImport {
         ct,
         structures,
-        landmarks: Landmarks::default(),
-        rims: [None, None],
+        given: Given::default(),
         origin: CtOrigin {
             kind: "labels",
             name: "body".into(),
@@ -84,8 +82,8 @@ fn what_is_on_the_grid_passes_bit_for_bit() {
     let mut import = import(body.ct.clone(), BODY.1.clone(), vec![]);
     let left = Landmark::Asis;
     let point = body.landmarks.get(left, Side::Left).unwrap();
-    import.landmarks.set(left, Side::Left, point);
-    import.rims[1] = Some(body.rims[1].to_vec());
+    import.given.landmarks.set(left, Side::Left, point);
+    import.given.rims[1] = Some(body.rims[1].to_vec());
     let with = specimen_from_ct(import, &parameters()).unwrap();
     assert_eq!(with.specimen.landmarks.get(left, Side::Left), Some(point));
     assert_eq!(
@@ -132,12 +130,16 @@ fn without_detection_everything_must_be_given() {
         message.contains("ASIS_l") && message.contains("right rim"),
         "{message}"
     );
-    import.landmarks = body.landmarks.clone();
-    import.rims = body.rims.clone().map(|rim| Some(rim.to_vec()));
+    import.given.landmarks = body.landmarks.clone();
+    import.given.rims = body.rims.clone().map(|rim| Some(rim.to_vec()));
     let with = specimen_from_ct(import, &parameters()).unwrap();
     assert_eq!(with.specimen.landmarks, body.landmarks);
     assert_eq!(with.specimen.rims, body.rims);
-    assert!(with.notes.iter().any(|n| matches!(n, Note::NotDetected(_))));
+    assert!(
+        with.notes
+            .iter()
+            .any(|n| matches!(n, Note::NotDetected { .. }))
+    );
 }
 
 #[test]
@@ -380,7 +382,7 @@ fn a_deepfluoro_file_gives_the_same_with_its_own_landmarks() {
     let read = deepfluoro::read_deepfluoro(&path, None).unwrap();
     assert_eq!(&read.structures, structures);
     let mut import = import(read.ct, read.structures, read.notes);
-    import.landmarks = read.landmarks;
+    import.given.landmarks = read.landmarks;
     let found = specimen_from_ct(import, &parameters()).unwrap().specimen;
     let mut expected = DIRECT.clone();
     for (landmark, side, p) in body.landmarks.iter() {

@@ -108,13 +108,24 @@ pub(super) fn parse(text: &str, path: &Path) -> Result<PointsFile, PointsFileErr
             }
         }
         if curve {
+            // Newer versions of Slicer save each curve to a file that is named for it, and no name in it.
+            let name = match markup.name.trim() {
+                "" if file.markups.len() == 1 => stem(path),
+                name => name.to_owned(),
+            };
             found.closed_curves.push(NamedCurve {
-                name: markup.name.trim().to_owned(),
+                name,
                 points: along,
             });
         }
     }
     Ok(found)
+}
+
+/// A file's name without `.mrk.json`.
+fn stem(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    name.split('.').next().unwrap_or_default().to_owned()
 }
 
 /// The schema takes LPS where nothing is said; here that is too little.

@@ -30,6 +30,25 @@ impl LandmarkOverrides {
             .map(|side| format!("{side} rim"));
         landmarks.chain(rims).collect()
     }
+
+    /// Takes those of another file too.
+    ///
+    /// # Errors
+    /// The names of those that both have, of which nothing is taken then.
+    pub fn join(&mut self, other: Self) -> Result<(), String> {
+        let mine = self.names();
+        let twice = other.names().into_iter();
+        let twice: Vec<String> = twice.filter(|name| mine.contains(name)).collect();
+        if !twice.is_empty() {
+            return Err(twice.join(", "));
+        }
+        self.landmarks.set_all(&other.landmarks);
+        for (rim, given) in self.rims.iter_mut().zip(other.rims) {
+            *rim = rim.take().or(given);
+        }
+        self.ignored.extend(other.ignored);
+        Ok(())
+    }
 }
 
 /// Reads the landmarks and rims that a file names ([`super::names`] is the rule).
@@ -94,6 +113,10 @@ impl Reading<'_> {
         }
         for curve in file.closed_curves {
             match meaning(&curve.name) {
+                // As of a file in which nobody drew it yet.
+                Meaning::Rim(..) if curve.points.is_empty() => self
+                    .ignored
+                    .push(format!("closed curve '{}' has no points", curve.name)),
                 Meaning::Rim(side, _) => {
                     let curve = (curve.name, curve.points);
                     let name = curve.0.clone();

@@ -342,15 +342,45 @@ fn written_markups_come_back_and_are_not_overwritten() {
     .unwrap_err();
     assert!(matches!(error, PointsFileError::Exists(_)), "{error}");
     assert_eq!(std::fs::read(&path).unwrap(), before);
-    // A body without a rim has no curve.
-    let path = folder.path().join("none.mrk.json");
-    write_markups(&expected(), [&[], &[]], &path).unwrap();
-    assert_eq!(read_landmark_overrides(&path).unwrap().rims, [None, None]);
     // What Slicer's schema asks for.
-    let text = std::fs::read_to_string(&path).unwrap();
-    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&before).unwrap();
     assert!(json["@schema"].as_str().unwrap().ends_with("-v1.0.3.json#"));
     assert_eq!(json["markups"][0]["type"], "Fiducial");
+}
+
+#[test]
+fn what_is_missing_is_written_without_a_position_and_passed_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("draft.mrk.json");
+    let mut some = Landmarks::default();
+    for (landmark, side, point) in expected().iter() {
+        if landmark.key(side) != "GSN_l" && landmark != Landmark::Iof {
+            some.set(landmark, side, point);
+        }
+    }
+    let right = ring(30);
+    write_markups(&some, [&[], &right], &path).unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let points = json["markups"][0]["controlPoints"].as_array().unwrap();
+    let undefined = points.iter().filter(|p| p["positionStatus"] == "undefined");
+    let undefined: Vec<&str> = undefined
+        .inspect(|p| assert_eq!(p["position"], "", "as Slicer writes it"))
+        .map(|p| p["label"].as_str().unwrap())
+        .collect();
+    assert_eq!(
+        (points.len(), undefined),
+        (16, vec!["IOF_l", "IOF_r", "GSN_l"])
+    );
+    assert_eq!(json["markups"][1]["name"], "rim_l");
+    assert_eq!(json["markups"][1]["controlPoints"], serde_json::json!([]));
+    let read = read_landmark_overrides(&path).unwrap();
+    assert_eq!((read.landmarks, read.rims), (some, [None, Some(right)]));
+    let lines = read.ignored.join("\n");
+    for part in ["IOF_l", "IOF_r", "GSN_l", "'rim_l' has no points"] {
+        assert!(lines.contains(part), "expected '{part}' in {lines}");
+    }
+    assert_eq!(read.ignored.len(), 4, "{lines}");
 }
 
 #[test]
@@ -411,4 +441,33 @@ fn one_rim_is_not_given_twice() {
         read.ignored,
         ["closed curve 'CC' is neither a landmark nor a rim"]
     );
+}
+
+/// As newer versions of Slicer save what they read from one file.
+#[test]
+fn landmarks_and_rims_may_come_in_a_file_each() {
+    let folder = tempfile::tempdir().unwrap();
+    let (whole, rims) = (folder.path().join("all.mrk.json"), [ring(40), ring(24)]);
+    write_markups(&expected(), rims.each_ref().map(Vec::as_slice), &whole).unwrap();
+    let all = read_landmark_overrides(&whole).unwrap();
+    let mut json: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(&whole).unwrap()).unwrap();
+    let mut joined = super::LandmarkOverrides::default();
+    for name in ["landmarks", "rim_l", "rim_r"] {
+        let mut one = json.clone();
+        let mut markup = json["markups"].as_array_mut().unwrap().remove(0);
+        markup.as_object_mut().unwrap().remove("name");
+        one["markups"] = vec![markup].into();
+        let path = folder.path().join(format!("{name}.mrk.json"));
+        std::fs::write(&path, one.to_string()).unwrap();
+        let part = read_landmark_overrides(&path).unwrap();
+        joined.join(part.clone()).unwrap();
+        let twice = joined.clone().join(part).unwrap_err();
+        match name {
+            "landmarks" => assert!(twice.contains("ASIS_l"), "{twice}"),
+            "rim_l" => assert_eq!(twice, "left rim"),
+            _ => assert_eq!(twice, "right rim"),
+        }
+    }
+    assert_eq!(joined, all);
 }

@@ -1,7 +1,7 @@
 //! Landmarks and rims as a file that Slicer 5 opens, to be corrected there by hand.
 
 use super::error::PointsFileError;
-use crate::anatomy::{Landmarks, Side};
+use crate::anatomy::{Landmark, Landmarks, Side};
 use crate::geometry::Point;
 use serde_json::{Value, json};
 use std::fs::File;
@@ -11,9 +11,10 @@ use std::path::Path;
 /// The version that Slicer 4.13 and 5 write.
 const SCHEMA: &str = "https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/Markups/Resources/Schema/markups-schema-v1.0.3.json#";
 
-/// Writes a new `.mrk.json` file: a list of points named by [`crate::anatomy::Landmark::key`], and
-/// a closed curve `rim_l` and `rim_r` for each rim that is not empty. LPS, mm, every number to its
-/// last bit; [`super::read_landmark_overrides`] reads it.
+/// Writes a new `.mrk.json` file: a list of all landmarks, named by [`crate::anatomy::Landmark::key`], and
+/// a closed curve `rim_l` and `rim_r` for the rims. LPS, mm, every number to its last bit;
+/// [`super::read_landmark_overrides`] reads it. A landmark that is not there becomes a point without a
+/// position, which Slicer shows as such and lets people place, an empty rim a curve without points.
 ///
 /// # Errors
 /// When the file exists, since somebody may have corrected it, or the disk refuses.
@@ -22,18 +23,16 @@ pub fn write_markups(
     rims: [&[Point]; 2],
     path: &Path,
 ) -> Result<(), PointsFileError> {
-    let points = landmarks
-        .iter()
-        .map(|(landmark, side, at)| control_point(&landmark.key(side), &at));
+    let all = Landmark::ALL.into_iter();
+    let points = all.flat_map(|landmark| {
+        Side::BOTH.map(|side| control_point(&landmark.key(side), landmarks.get(landmark, side)))
+    });
     let mut markups = vec![markup("Fiducial", "landmarks", points.collect())];
     for side in Side::BOTH {
-        let rim = rims[side.index()];
-        if rim.is_empty() {
-            continue;
-        }
         let name = format!("rim_{}", &side.name()[..1]);
-        let points = rim.iter().enumerate();
-        let points = points.map(|(n, at)| control_point(&format!("{name}_{:02}", n + 1), at));
+        let points = rims[side.index()].iter().enumerate();
+        let points =
+            points.map(|(n, &at)| control_point(&format!("{name}_{:02}", n + 1), Some(at)));
         markups.push(markup("ClosedCurve", &name, points.collect()));
     }
     let file = json!({"@schema": SCHEMA, "markups": markups});
@@ -62,10 +61,15 @@ fn markup(kind: &str, name: &str, points: Vec<Value>) -> Value {
     })
 }
 
-fn control_point(label: &str, at: &Point) -> Value {
+/// As Slicer writes them, those without a position too.
+fn control_point(label: &str, at: Option<Point>) -> Value {
+    let (position, status) = match at {
+        Some(at) => (json!([at.x, at.y, at.z]), "defined"),
+        None => (json!(""), "undefined"),
+    };
     json!({
         "label": label,
-        "position": [at.x, at.y, at.z],
-        "positionStatus": "defined",
+        "position": position,
+        "positionStatus": status,
     })
 }

@@ -1,6 +1,6 @@
 //! Why bone surfaces could not be made a specimen.
 
-use crate::anatomy::detect::DetectError;
+use crate::anatomy::detect::{DetectError, Unfound};
 use std::path::PathBuf;
 
 /// Why bone surfaces could not be made a specimen.
@@ -57,6 +57,12 @@ pub enum ImportError {
     Several(Vec<ImportError>),
     #[error("cannot find the landmarks: {0}")]
     Detect(#[from] DetectError),
+    #[error(
+        "cannot find the landmarks. Neither found nor given are:\n{0}\nLook at the surfaces there, or give these by --landmarks FILE (docs/formats.md, Points)"
+    )]
+    Landmarks(#[from] Box<Unfound>),
+    #[error("body and density are made around femoral heads, and no head's size is known: {0}")]
+    Heads(String),
 }
 
 fn also(unread: &[String]) -> String {

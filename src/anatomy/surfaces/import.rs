@@ -9,8 +9,9 @@ use super::origin::SurfacesOrigin;
 use super::parameters::SurfacesParameters;
 use super::soft_tissue::soft_tissue;
 use super::voxelize::for_each_inside;
-use crate::anatomy::detect::{BoneSurfaces, Detected, detect};
-use crate::anatomy::{Label, Side, Source, Specimen, Structure, StructureLabels};
+use crate::anatomy::detect::{BoneSurfaces, Given, Head, Place, detect_with};
+use crate::anatomy::import::{Imported, told};
+use crate::anatomy::{Label, Landmark, Side, Source, Specimen, Structure, StructureLabels};
 use crate::geometry::{Point, Vector};
 use crate::random::{Purpose, Stream, stream};
 use crate::volume::distance::squared_distance;
@@ -41,11 +42,11 @@ struct Bone<'a> {
 
 /// Makes a specimen from bone surfaces: voxels of [`SurfacesParameters::voxel_mm`] from
 /// `below_heads_mm` below the femoral heads to above the iliac crests, with landmarks and rims by
-/// [`detect`] and assigned densities. The same surfaces, parameters and name give the same
+/// [`crate::anatomy::detect`] and assigned densities. The same surfaces, parameters and name give the same
 /// specimen, to the last bit.
 ///
 /// # Errors
-/// When landmarks cannot be found.
+/// When a landmark or rim cannot be found.
 ///
 /// # Panics
 /// When a parameter is out of its range ([`SurfacesParameters::problems`]).
@@ -54,11 +55,36 @@ pub fn specimen_from_surfaces(
     origin: &SurfacesOrigin,
     parameters: &SurfacesParameters,
 ) -> Result<Specimen, ImportError> {
+    let made = specimen_from_surfaces_with(bones, origin, parameters, &Given::default())?;
+    Ok(made.specimen)
+}
+
+/// As [`specimen_from_surfaces`], with landmarks and rims that people placed in place of those found.
+///
+/// # Errors
+/// When something is neither found nor given ([`ImportError::Landmarks`] has the rest), or the bones have
+/// no pelvic frame or no femoral head of known size: body and density are made around the heads.
+///
+/// # Panics
+/// As [`specimen_from_surfaces`].
+pub fn specimen_from_surfaces_with(
+    bones: &BoneSurfaces,
+    origin: &SurfacesOrigin,
+    parameters: &SurfacesParameters,
+    given: &Given,
+) -> Result<Imported, ImportError> {
     assert_eq!(parameters.problems(), vec![], "parameters in range");
-    let found = detect(bones)?;
-    let heads = found.heads.map(|h| h.center);
-    let body = Body::around(bones, heads, parameters);
-    let grid = grid(bones, &body, heads, parameters);
+    let marks = detect_with(bones, &given.landmarks)?.completed(given)?;
+    let [Some(left), Some(right)] = marks.heads else {
+        let heads = marks.not_found.iter();
+        let heads = heads.filter(|missing| missing.place == Place::Landmark(Landmark::Fh));
+        let reasons: Vec<String> = heads.map(|missing| missing.error.to_string()).collect();
+        return Err(ImportError::Heads(reasons.join("; ")));
+    };
+    let heads = [left, right];
+    let centers = heads.map(|head| head.center);
+    let body = Body::around(bones, centers, parameters);
+    let grid = grid(bones, &body, centers, parameters);
     let list = bone_list(bones);
     let which = bone_numbers(&list, &grid);
     let labels = which.map(|n| match n {
@@ -66,15 +92,17 @@ pub fn specimen_from_surfaces(
         n => list[usize::from(n) - 1].kind.label().value(),
     });
     let mut stream = stream(parameters.seed, Purpose::AssignedDensity, &origin.name);
-    let ct = assigned_ct(&list, &which, &body, &found, parameters, &mut stream);
-    Ok(Specimen {
+    let ct = assigned_ct(&list, &which, &body, &heads, parameters, &mut stream);
+    let notes = told(&marks);
+    let specimen = Specimen {
         name: origin.name.clone(),
         source: surfaces_source(origin, parameters),
         ct,
         labels,
-        landmarks: found.landmarks,
-        rims: found.rims,
-    })
+        landmarks: marks.landmarks,
+        rims: marks.rims,
+    };
+    Ok(Imported { specimen, notes })
 }
 
 impl<'a> Bone<'a> {
@@ -155,7 +183,7 @@ fn assigned_ct(
     list: &[Bone],
     which: &Volume<u8>,
     body: &Body,
-    found: &Detected,
+    heads: &[Head; 2],
     p: &SurfacesParameters,
     stream: &mut Stream,
 ) -> Volume<i16> {
@@ -192,7 +220,7 @@ fn assigned_ct(
                     texture: fine * std::f64::consts::FRAC_1_SQRT_2,
                     shell: f64::from(shell.at(&at)),
                 };
-                let tissue = bone.tissue(&at, found, &local, p);
+                let tissue = bone.tissue(&at, heads, &local, p);
                 Some((offset, profile.excess_hu(depth_mm, &tissue) as f32))
             })
             .collect();
@@ -222,7 +250,7 @@ impl Bone<'_> {
     fn tissue(
         &self,
         at: &Point,
-        found: &Detected,
+        heads: &[Head; 2],
         local: &Local,
         p: &SurfacesParameters,
     ) -> BoneTissue {
@@ -237,7 +265,7 @@ impl Bone<'_> {
             Structure::Sacrum => spongy(p.cortical_mm * 2.0 / 3.0, p.trabecular_hu * 0.6),
             Structure::Hip(side) => {
                 // Bone carries the joint's load: its shell and sponge are denser there.
-                let head = &found.heads[side.index()];
+                let head = &heads[side.index()];
                 let beyond = (at - head.center).norm() - head.radius_mm;
                 let joint = 1.0 - smooth_step(5.0, 18.0, beyond);
                 spongy(
@@ -246,7 +274,7 @@ impl Bone<'_> {
                 )
             }
             Structure::Femur(side) => {
-                let head = &found.heads[side.index()];
+                let head = &heads[side.index()];
                 let from_head = (at - head.center).norm() / head.radius_mm;
                 let in_head = 1.0 - smooth_step(0.8, 1.3, from_head);
                 let upper = spongy(p.cortical_mm, p.trabecular_hu * (0.7 + 1.1 * in_head));

@@ -17,7 +17,9 @@ mod voxelize;
 
 pub use bone_files::{BONES, bone_files, read_bone_surfaces};
 pub use error::ImportError;
-pub use import::{specimen_from_surfaces, structures_from_surfaces, surfaces_source};
+pub use import::{
+    specimen_from_surfaces, specimen_from_surfaces_with, structures_from_surfaces, surfaces_source,
+};
 pub use mesh_file::{MeshFormat, read_closed_surface};
 pub use origin::{ORIGIN_FILE, SurfacesOrigin};
 pub use parameters::SurfacesParameters;

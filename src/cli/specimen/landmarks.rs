@@ -1,5 +1,6 @@
 //! `pao-sim specimen landmarks`: a specimen's landmarks for 3D Slicer.
 
+use super::import::check_markups_name;
 use super::source::Source;
 use crate::cli::args::Common;
 use crate::cli::error::{Exit, Failure};
@@ -21,13 +22,7 @@ pub struct Arguments {
 
 pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let out = &arguments.out;
-    // Slicer tells what a file is by its name.
-    if !out.to_string_lossy().ends_with(".mrk.json") {
-        return Err(Failure::Usage(format!(
-            "--out is {}; expected a name that ends with .mrk.json",
-            out.display()
-        )));
-    }
+    check_markups_name("--out", out)?;
     let specimen = arguments.source.specimen()?;
     write_markups(
         &specimen.landmarks,

@@ -3,18 +3,21 @@
 use crate::cli::args::Common;
 use crate::cli::error::{Exit, Failure};
 use crate::cli::output::say;
+use pao_sim::anatomy::detect::{Given, Unfound};
 use pao_sim::anatomy::import::{
-    CtImport, CtImportParameters, CtOrigin, Imported, Note, specimen_from_ct,
+    CtImport, CtImportError, CtImportParameters, CtOrigin, Imported, Note, specimen_from_ct,
 };
-use pao_sim::anatomy::landmark_files::{LandmarkOverrides, read_landmark_overrides};
-use pao_sim::anatomy::{Landmarks, SpecimenError, StructureLabels, write_specimen};
+use pao_sim::anatomy::landmark_files::{
+    LandmarkOverrides, PointsFileError, read_landmark_overrides, write_markups,
+};
+use pao_sim::anatomy::{Landmarks, Side, SpecimenError, StructureLabels, write_specimen};
 use pao_sim::volume::{Volume, read_dicom_series_of, read_volume};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// Flags of every importer.
 #[derive(Debug, clap::Args)]
-pub struct Given {
+pub struct Shared {
     /// The specimen's folder; it must not be there yet
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
@@ -32,16 +35,20 @@ pub struct Given {
     #[arg(long, value_name = "TEXT")]
     pub from: Option<String>,
     /// Landmarks and rims that people placed (.fcsv, .mrk.json, .csv); they replace those of the data and
-    /// those found by rule
+    /// those found by rule. May be given several times: 3D Slicer saves points and curves to a file each
     #[arg(long, value_name = "FILE")]
-    landmarks: Option<PathBuf>,
+    landmarks: Vec<PathBuf>,
+    /// Write landmarks and rims there for 3D Slicer, whether or not all were found: those that are missing are
+    /// points without a position, to be placed and given by --landmarks. Named .mrk.json; it must not be there yet
+    #[arg(long, value_name = "FILE")]
+    draft_landmarks: Option<PathBuf>,
 }
 
 /// Flags of every importer that starts from a CT.
 #[derive(Debug, clap::Args)]
 pub struct Target {
     #[command(flatten)]
-    given: Given,
+    shared: Shared,
     /// Edge of the specimen's voxels
     #[arg(long, value_name = "MM", default_value_t = 1.0)]
     voxel_mm: f64,
@@ -92,58 +99,95 @@ pub struct Read {
     pub notes: Vec<Note>,
 }
 
-impl Given {
+impl Shared {
     /// Says so when the folder is there: what takes a minute is not begun for nothing.
     pub fn check(&self) -> Result<(), Failure> {
+        if let Some(draft) = &self.draft_landmarks {
+            check_markups_name("--draft-landmarks", draft)?;
+            if draft.exists() {
+                return Err(PointsFileError::Exists(draft.clone()).into());
+            }
+        }
         match self.out.exists() {
             true => Err(SpecimenError::Exists(self.out.clone()).into()),
             false => Ok(()),
         }
     }
 
-    /// What the landmark file gives; a note for each of its points that means nothing. Nothing without a file.
+    /// What the landmark files give; a note for each of their points that means nothing. Nothing without a file.
     pub fn landmarks(&self, notes: &mut Vec<Note>) -> Result<LandmarkOverrides, Failure> {
-        let Some(file) = &self.landmarks else {
-            return Ok(LandmarkOverrides::default());
-        };
-        let given = read_landmark_overrides(file)?;
-        let told = |line| Note::Reader(format!("{}: {line}", file.display()));
-        notes.extend(given.ignored.iter().map(told));
-        Ok(given)
+        let mut all = LandmarkOverrides::default();
+        for file in &self.landmarks {
+            let given = read_landmark_overrides(file)?;
+            let told = |line| Note::Reader(format!("{}: {line}", file.display()));
+            notes.extend(given.ignored.iter().map(told));
+            all.join(given).map_err(|twice| {
+                Failure::Usage(format!(
+                    "--landmarks {} gives {twice}, which a file before it gives too; expected each landmark \
+                     and rim in one file",
+                    file.display()
+                ))
+            })?;
+        }
+        Ok(all)
     }
 
-    /// Writes the specimen and tells about it.
-    pub fn write(&self, made: &Imported, common: &Common) -> Result<Exit, Failure> {
+    /// Writes the specimen and tells about it; what was found for 3D Slicer first, also where that is not all.
+    pub fn finish<E: Into<Failure>>(
+        &self,
+        made: Result<Imported, E>,
+        unfound: impl Fn(&E) -> Option<&Unfound>,
+        common: &Common,
+    ) -> Result<Exit, Failure> {
+        if let Some(draft) = &self.draft_landmarks {
+            let found = match &made {
+                Ok(Imported { specimen, .. }) => Some((
+                    &specimen.landmarks,
+                    Side::BOTH.map(|side| specimen.rim(side)),
+                )),
+                Err(error) => unfound(error).map(|found| {
+                    let rim = |side: Side| found.rims[side.index()].as_deref();
+                    let points = |side| rim(side).map_or(&[][..], Vec::as_slice);
+                    (&found.landmarks, Side::BOTH.map(points))
+                }),
+            };
+            if let Some((landmarks, rims)) = found {
+                write_markups(landmarks, rims, draft)?;
+            }
+        }
+        let made = made.map_err(E::into)?;
         write_specimen(&made.specimen, &self.out)?;
-        tell(made, &self.out, common);
+        tell(&made, &self.out, common);
         Ok(Exit::Complete)
     }
 }
 
 impl Target {
-    /// As [`Given::check`].
+    /// As [`Shared::check`].
     pub fn check(&self) -> Result<(), Failure> {
-        self.given.check()
+        self.shared.check()
     }
 
     /// Makes the specimen, writes it and tells about it.
     pub fn finish(&self, read: Read, known: Known, common: &Common) -> Result<Exit, Failure> {
-        let given = &self.given;
+        let shared = &self.shared;
         let (mut landmarks, mut notes) = (read.landmarks, read.notes);
-        let overrides = given.landmarks(&mut notes)?;
+        let overrides = shared.landmarks(&mut notes)?;
         landmarks.set_all(&overrides.landmarks);
         let flag = |flag: &Option<String>, known: String| flag.clone().unwrap_or(known);
         let import = CtImport {
             ct: read.ct,
             structures: read.structures,
-            landmarks,
-            rims: overrides.rims,
+            given: Given {
+                landmarks,
+                rims: overrides.rims,
+            },
             origin: CtOrigin {
                 kind: known.kind,
-                name: flag(&given.name, folder_name(&given.out)),
-                sex: flag(&given.sex, known.sex),
-                licence: flag(&given.licence, known.licence),
-                from: flag(&given.from, known.from),
+                name: flag(&shared.name, folder_name(&shared.out)),
+                sex: flag(&shared.sex, known.sex),
+                licence: flag(&shared.licence, known.licence),
+                from: flag(&shared.from, known.from),
             },
             notes,
         };
@@ -151,7 +195,25 @@ impl Target {
             voxel_mm: self.voxel_mm,
             ..Default::default()
         };
-        given.write(&specimen_from_ct(import, &parameters)?, common)
+        shared.finish(specimen_from_ct(import, &parameters), unfound, common)
+    }
+}
+
+fn unfound(error: &CtImportError) -> Option<&Unfound> {
+    match error {
+        CtImportError::Landmarks(unfound) => Some(unfound),
+        _ => None,
+    }
+}
+
+/// Says so when a file for 3D Slicer is named otherwise: Slicer tells what a file is by its name.
+pub fn check_markups_name(flag: &str, path: &Path) -> Result<(), Failure> {
+    match path.to_string_lossy().ends_with(".mrk.json") {
+        true => Ok(()),
+        false => Err(Failure::Usage(format!(
+            "{flag} is {}; expected a name that ends with .mrk.json",
+            path.display()
+        ))),
     }
 }
 

@@ -1,12 +1,14 @@
 //! From closed surfaces of the bones.
 
-use super::common::{Given, folder_name};
+use super::common::{Shared, folder_name};
 use crate::cli::args::Common;
 use crate::cli::error::{Exit, Failure};
 use crate::cli::specimen::source::Bodies;
-use pao_sim::anatomy::Specimen;
-use pao_sim::anatomy::import::{Imported, Note};
-use pao_sim::anatomy::surfaces::{SurfacesOrigin, read_bone_surfaces, specimen_from_surfaces};
+use pao_sim::anatomy::detect::{Given, Unfound};
+use pao_sim::anatomy::landmark_files::LandmarkOverrides;
+use pao_sim::anatomy::surfaces::{
+    ImportError, SurfacesOrigin, read_bone_surfaces, specimen_from_surfaces_with,
+};
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -14,51 +16,56 @@ pub struct Arguments {
     /// Folder of the surfaces; its surfaces.toml, if it has one, says sex, licence, origin and frame
     dir: PathBuf,
     #[command(flatten)]
-    given: Given,
+    shared: Shared,
     #[command(flatten)]
     bodies: Bodies,
 }
 
 pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
-    arguments.given.check()?;
+    let shared = &arguments.shared;
+    shared.check()?;
     let mut notes = Vec::new();
-    let overrides = arguments.given.landmarks(&mut notes)?;
-    let mut specimen = specimen(arguments)?;
-    let names = overrides.names();
-    if !names.is_empty() {
-        notes.push(Note::Overridden(names.join(", ")));
-    }
-    specimen.landmarks.set_all(&overrides.landmarks);
-    for (rim, given) in specimen.rims.iter_mut().zip(overrides.rims) {
-        if let Some(points) = given {
-            *rim = points.into();
-        }
-    }
-    let made = Imported { specimen, notes };
-    arguments.given.write(&made, common)
-}
-
-fn specimen(arguments: &Arguments) -> Result<Specimen, Failure> {
+    let LandmarkOverrides {
+        landmarks, rims, ..
+    } = shared.landmarks(&mut notes)?;
     let population = arguments.bodies.population()?;
     let bones = read_bone_surfaces(&arguments.dir)?;
-    let given = &arguments.given;
-    let name = match &given.name {
+    let made = specimen_from_surfaces_with(
+        &bones,
+        &origin(arguments)?,
+        &population.surface_bodies,
+        &Given { landmarks, rims },
+    );
+    let made = made.map(|mut made| {
+        made.notes.splice(0..0, notes);
+        made
+    });
+    shared.finish(made, unfound, common)
+}
+
+fn unfound(error: &ImportError) -> Option<&Unfound> {
+    match error {
+        ImportError::Landmarks(unfound) => Some(unfound),
+        _ => None,
+    }
+}
+
+/// What is known of the surfaces: by the flags, by their `surfaces.toml`.
+fn origin(arguments: &Arguments) -> Result<SurfacesOrigin, Failure> {
+    let shared = &arguments.shared;
+    let name = match &shared.name {
         Some(name) => name.clone(),
         None => folder_name(&arguments.dir),
     };
     let mut origin = SurfacesOrigin::of_folder(&arguments.dir, &name)?;
     for (value, flag) in [
-        (&mut origin.sex, &given.sex),
-        (&mut origin.licence, &given.licence),
-        (&mut origin.from, &given.from),
+        (&mut origin.sex, &shared.sex),
+        (&mut origin.licence, &shared.licence),
+        (&mut origin.from, &shared.from),
     ] {
         if let Some(flag) = flag {
             value.clone_from(flag);
         }
     }
-    Ok(specimen_from_surfaces(
-        &bones,
-        &origin,
-        &population.surface_bodies,
-    )?)
+    Ok(origin)
 }
