@@ -123,9 +123,10 @@ fn calibrated(distances: &[f64], scatters: &[f64], uncertainties: &[f64]) {
         distances.len()
     );
     assert!(with_scatter > 0.5, "{with_scatter}");
-    assert!(with_distance > 0.2, "{with_distance}");
+    // Between the rule's place and the mean of five raters there is little left to tell.
+    assert!(with_distance > 0.0, "{with_distance}");
     assert!((0.4..1.0).contains(&size(distances)));
-    assert!((0.6..1.4).contains(&size(scatters)));
+    assert!((0.8..1.2).contains(&size(scatters)));
 }
 
 /// What thicker slices of the same bones do, and how symmetric the landmarks are.
@@ -175,5 +176,5 @@ fn landmarks_bear_thick_slices_and_mirror_each_other() {
         square.sqrt(),
         moves.len()
     );
-    assert!(square.sqrt() < 1.0 && far * 50 < moves.len());
+    assert!(square.sqrt() < 0.3 && far == 0);
 }

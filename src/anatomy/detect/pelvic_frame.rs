@@ -11,8 +11,8 @@ use nalgebra::Rotation3;
 /// Each round changes directions by about a tenth of the round before.
 const MAX_ROUNDS: usize = 30;
 
-/// Directions that change by less have settled (rad): a nanometre at a pelvis' size.
-const SETTLED: f64 = 1e-8;
+/// Directions that change by less have settled (rad): by then a landmark moves by less than its last digits.
+const SETTLED: f64 = 1e-11;
 
 /// The pubic bones' foremost points lie within this part of the distance between both hip bones' centres
 /// from the midline; spines of the ilium lie farther out. Without it, a pelvis seen from above (flexed
