@@ -10,6 +10,7 @@ use pao_sim::anatomy::detect::{Detected, Extra, detect};
 use pao_sim::anatomy::surfaces::read_bone_surfaces;
 use pao_sim::anatomy::{Landmark, Side};
 use pao_sim::geometry::Point;
+use std::collections::BTreeMap;
 
 /// Mean (LPS) and standard deviation over all axes of one landmark of one subject.
 fn raters(all: &serde_json::Value, subject: &str, side: Side, name: &str) -> (Point, f64) {
@@ -134,6 +135,7 @@ fn calibrated(distances: &[f64], scatters: &[f64], uncertainties: &[f64]) {
 fn landmarks_bear_thick_slices_and_mirror_each_other() {
     let Some(data) = data::vsd() else { return };
     let mut moves = Vec::new();
+    let mut fine: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
     for subject in SUBJECTS {
         let bones = read_bone_surfaces(&data.join(subject)).unwrap();
         let found = detect(&bones).unwrap();
@@ -151,6 +153,9 @@ fn landmarks_bear_thick_slices_and_mirror_each_other() {
                     let at = |of: &Detected| of.landmarks.get(landmark, side).unwrap();
                     let moved = (at(&again) - at(&found)).norm();
                     line.push(format!("{} {moved:.1}", landmark.key(side)));
+                    if thickness == 1 {
+                        fine.entry(landmark.name()).or_default().push(moved);
+                    }
                     let from = found.landmarks.provenance(landmark, side).unwrap();
                     let uncertainty_mm = from.uncertainty_mm.unwrap();
                     // The head's sphere is surer than slices of voxels are.
@@ -168,6 +173,13 @@ fn landmarks_bear_thick_slices_and_mirror_each_other() {
             }
             println!("{subject} {thickness} mm slices: {}", line.join(", "));
         }
+    }
+    // A specimen comes out the same from surfaces and from voxels of them.
+    for (landmark, moved) in fine {
+        let mean = moved.iter().sum::<f64>() / moved.len() as f64;
+        let most = moved.iter().copied().fold(0.0, f64::max);
+        println!("surfaces and 1 mm voxels: {landmark} {mean:.2} mm apart, {most:.2} at most");
+        assert!(mean < 0.4 && most < 0.8, "{landmark}: {mean}, {most} mm");
     }
     let square = moves.iter().map(|m| m * m).sum::<f64>() / moves.len() as f64;
     let far = moves.iter().filter(|m| **m > 2.0).count();

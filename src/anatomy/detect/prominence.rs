@@ -21,7 +21,7 @@ pub(super) struct Prominences {
 }
 
 /// Finds the prominences of a hip bone. The directions are anatomical (spines and tubercle look
-/// forward, a little outward and downward; the ischial spine looks back, a little inward and upward) and lie in the middle of
+/// forward, a little outward and downward; the ischial spine looks back and inward, a little upward) and lie in the middle of
 /// a range of 10 deg or more over which the points hardly move.
 ///
 /// `local` has its origin at the femoral head's centre; `ilium` is the most anterior point of the
@@ -62,7 +62,7 @@ pub(super) fn prominences(
         pubic_tubercle: find("pubic tubercle", forward(20.0, -20.0), &|p| {
             (symphysis.x + 0.2 * width_mm - p.x).min(symphysis.y + 15.0 - p.y)
         }),
-        ischial_spine: find("ischial spine", forward(-10.0, 170.0), &|p| {
+        ischial_spine: find("ischial spine", forward(-30.0, 170.0), &|p| {
             (radius_mm - p.y.abs()).min(-p.z)
         }),
     }
