@@ -123,7 +123,9 @@ fn advice_follows_the_table_for_what_is_not_ok_and_nothing_else() {
     );
     for line in lines.lines() {
         let check: serde_json::Value = serde_json::from_str(line).unwrap();
-        assert!(!check["advice"].as_str().unwrap().is_empty(), "{line}");
+        let advice = check["advice"].as_str();
+        assert_eq!(advice.is_some(), check["verdict"] != "ok", "{line}");
+        assert!(advice.is_none_or(|advice| !advice.is_empty()), "{line}");
     }
 }
 
@@ -481,12 +483,29 @@ fn a_ct_with_a_label_map_is_imported_and_proved() {
     };
     let (_, refused) = import("9", 1);
     assert!(refused.contains("voxel_mm is 9"), "{refused}");
+    let mut command = pao_sim();
+    command.args(["specimen", "import", "labels"]);
+    command.args([at("ct.nii.gz"), at("map.nii.gz")]);
+    let (_, misnamed) = said(command.arg("--out").arg(at("my_body")), 2);
+    assert!(
+        misnamed.contains("'my_body'; expected letters"),
+        "{misnamed}"
+    );
     assert!(!at("made").exists(), "nothing is half-written");
     let (told, _) = import("2", 0);
     let told: serde_json::Value = serde_json::from_str(&told).unwrap();
     assert_eq!(told["specimen"], "made");
     assert_eq!(told["voxel_mm"], 2.0);
     let notes = told["notes"].to_string();
+    assert!(told["checks"].as_u64().unwrap() > 80);
+    let findings = told["findings"].as_array().unwrap();
+    let coarse = findings
+        .iter()
+        .any(|f| f["check"] == "largest edge of a voxel");
+    assert!(
+        coarse && findings.iter().all(|f| f["verdict"] == "doubtful"),
+        "{told}"
+    );
     assert!(
         notes.contains("taken from the landmark file: ASIS_l"),
         "{notes}"
@@ -502,6 +521,18 @@ fn a_ct_with_a_label_map_is_imported_and_proved() {
     check(&at("made"), 0);
     let (_, refused) = import("2", 1);
     assert!(refused.contains("exists already"), "{refused}");
+    // Values that are no Hounsfield units, as programs for learning scale them.
+    write_nifti(&body.ct.map(|v| v + 1024), &at("ct.nii.gz")).unwrap();
+    std::fs::rename(at("made"), at("before")).unwrap();
+    let (told, _) = import("2", 1);
+    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
+    let wrong = told["findings"].as_array().unwrap().iter();
+    let wrong: Vec<_> = wrong.filter(|f| f["verdict"] == "WRONG").collect();
+    assert!(
+        wrong.iter().any(|f| f["check"].to_string().contains("air")),
+        "{wrong:?}"
+    );
+    assert!(at("made").is_dir());
     let mut command = pao_sim();
     command.args(["specimen", "import", "labels"]);
     command.args([at("ct.nii.gz"), at("map.nii.gz")]);

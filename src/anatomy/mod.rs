@@ -28,7 +28,7 @@ pub use lce::{LceApex, lce_angle};
 pub use mirror::mirror;
 pub use patient_frame::PatientFrame;
 pub use phantom::{PhantomParameters, phantom, phantom_structures};
-pub use problem::{SpecimenProblem, specimen_problems};
+pub use problem::{SEXES, SpecimenProblem, is_specimen_name, specimen_problems};
 pub use provenance::{Confidence, Found, Provenance};
 pub use rim::Rim;
 pub use side::Side;

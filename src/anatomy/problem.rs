@@ -10,6 +10,14 @@ pub const MIN_RIM_POINTS: usize = 24;
 /// Neighbouring points of a rim's trace are at most this far apart (mm).
 pub const MAX_RIM_GAP_MM: f64 = 10.0;
 
+/// What a specimen's sex may be.
+pub const SEXES: [&str; 3] = ["male", "female", "unknown"];
+
+/// Whether a name can be a specimen's: letters, digits and `-`, since it goes into keys.
+pub fn is_specimen_name(name: &str) -> bool {
+    !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-')
+}
+
 /// One thing that is wrong with a specimen.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -18,7 +26,7 @@ pub enum SpecimenProblem {
     MissingFile(String),
     #[error("{file}: {reason}")]
     Unreadable { file: String, reason: String },
-    #[error("name '{0}' holds characters other than letters, digits and '-', or none at all")]
+    #[error("name '{0}'; expected letters, digits and '-' only")]
     Name(String),
     #[error("sex is '{0}'; expected male, female or unknown")]
     Sex(String),
@@ -91,11 +99,11 @@ fn landmark_name(landmark: Landmark, side: Side) -> String {
 
 fn check_source(specimen: &Specimen, problems: &mut Vec<SpecimenProblem>) {
     let name = &specimen.name;
-    if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-') {
+    if !is_specimen_name(name) {
         problems.push(SpecimenProblem::Name(name.clone()));
     }
     let sex = &specimen.source.sex;
-    if !["male", "female", "unknown"].contains(&sex.as_str()) {
+    if !SEXES.contains(&sex.as_str()) {
         problems.push(SpecimenProblem::Sex(sex.clone()));
     }
 }

@@ -429,8 +429,11 @@ photons = 3
     fn a_folder_of_specimens_is_expanded_once() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("my.toml");
-        std::fs::create_dir(folder.path().join("people")).unwrap();
-        let text = "[population]\nphantoms = 0\nspecimens = [\"gone\", \"people\"]\n";
+        for name in ["one", "people"] {
+            std::fs::create_dir(folder.path().join(name)).unwrap();
+        }
+        std::fs::write(folder.path().join("one/specimen.toml"), "").unwrap();
+        let text = "[population]\nphantoms = 0\nspecimens = [\"one\", \"people\"]\n";
         std::fs::write(&file, text).unwrap();
         let none = Config::read(&file).unwrap_err().to_string();
         assert!(
@@ -443,7 +446,7 @@ photons = 3
             std::fs::write(person.join("specimen.toml"), "").unwrap();
         }
         let config = Config::read(&file).unwrap();
-        let expected = ["gone", "people/a", "people/b"].map(|name| folder.path().join(name));
+        let expected = ["one", "people/a", "people/b"].map(|name| folder.path().join(name));
         assert_eq!(config.population.specimens, expected);
         // What the study keeps needs no data.
         std::fs::write(&file, config.to_toml()).unwrap();

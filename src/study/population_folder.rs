@@ -4,13 +4,21 @@ use crate::anatomy::disk::HEADER_FILE;
 use std::path::{Path, PathBuf};
 
 /// The specimens that a path of `population.specimens` means: itself or, where it is a folder of specimens'
-/// folders, each of these by name. What is no folder stays as it is: reading it tells what is wrong.
+/// folders, each of these by name.
 ///
 /// # Errors
-/// With what was looked for, when the folder is there and holds no specimen.
+/// With what was looked for, when the folder is not there or holds no specimen.
 pub fn specimens_in(path: &Path) -> Result<Vec<PathBuf>, String> {
-    if path.join(HEADER_FILE).is_file() || !path.is_dir() {
+    // A path with a variable that is not set has been told of already.
+    let unset = path.as_os_str().to_string_lossy().contains("${");
+    if unset || path.join(HEADER_FILE).is_file() {
         return Ok(vec![path.to_owned()]);
+    }
+    if !path.is_dir() {
+        return Err(format!(
+            "names {}, which is no folder; relative paths start at the configuration's own folder",
+            path.display()
+        ));
     }
     let entries = std::fs::read_dir(path)
         .and_then(|entries| entries.collect::<Result<Vec<_>, _>>())
@@ -53,7 +61,8 @@ mod tests {
         let expected = ["a", "z10", "z2"].map(|name| root.join(name));
         assert_eq!(specimens_in(root).unwrap(), expected);
         assert_eq!(specimens_in(&expected[0]).unwrap(), expected[..1]);
-        assert_eq!(specimens_in(&root.join("no")).unwrap(), [root.join("no")]);
+        let absent = specimens_in(&root.join("no")).unwrap_err();
+        assert!(absent.contains("is no folder"), "{absent}");
         // A specimen is itself, whatever else lies in it.
         std::fs::write(root.join(HEADER_FILE), "").unwrap();
         assert_eq!(specimens_in(root).unwrap(), [root]);

@@ -17,7 +17,7 @@ pub fn specimen_list(population: &PopulationSection) -> BTreeMap<String, Source>
             SpecimenSource::Phantom(number) => Ok(phantom_source(*number, &population.phantom)),
             SpecimenSource::Folder(dir) => read_source(dir).map_err(|cause| cause.to_string()),
             SpecimenSource::Surfaces(dir) => SurfacesOrigin::of_folder(dir, &name)
-                .map(|origin| surfaces_source(&origin, &population.surface_bodies))
+                .map(|origin| surfaces_source(&origin, &population.surface_bodies, &[]))
                 .map_err(|cause| cause.to_string()),
         };
         match found {

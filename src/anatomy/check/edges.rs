@@ -58,6 +58,16 @@ pub(super) fn checks(specimen: &Specimen, bones: &Bones) -> Vec<Check> {
         (-2.0 * voxel, 2.0 * voxel),
     );
     thick.found = format!("{:.2} mm", -thin);
+    if !size.is_finite() {
+        let advice = "the CT has no edges of bone where the label map has them: is it in Hounsfield units, \
+                      and are both of the same body?";
+        return [shifted, thick]
+            .map(|mut check| {
+                check.found = "no edges of bone".into();
+                check.advise(advice)
+            })
+            .into();
+    }
     vec![
         shifted.advise(
             "bone leaves its label on one side and takes soft tissue along on the other: poses are off by the \

@@ -102,6 +102,14 @@ impl Detected {
     }
 }
 
+/// Where landmarks and rims come from, for people.
+pub(in crate::anatomy) fn by_rule_but(given: &[String]) -> String {
+    match given {
+        [] => "found by rule".to_owned(),
+        given => format!("found by rule but for those given: {}", given.join(", ")),
+    }
+}
+
 fn apart(a: &Point, b: &Point) -> bool {
     !((a - b).norm() <= SAME_MM)
 }

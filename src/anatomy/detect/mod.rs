@@ -27,6 +27,6 @@ pub use head::Head;
 pub(in crate::anatomy) use head::femoral_head;
 pub use landmarks::{Detected, Extra, detect, detect_with};
 pub(in crate::anatomy) use local::Local;
-pub(in crate::anatomy) use marks::by_reason;
 pub use marks::{Given, Marks, Unfound};
+pub(in crate::anatomy) use marks::{by_reason, by_rule_but};
 pub use missing::{Missing, Place};

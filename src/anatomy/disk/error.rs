@@ -26,7 +26,15 @@ pub enum SpecimenError {
     Volume(#[from] VolumeFileError),
 }
 
+/// More problems than this are counted only: points of a file in another frame are all outside.
+const TOLD: usize = 40;
+
 /// One line a problem, so that all of them can be mended in one go.
 fn list(problems: &[SpecimenProblem]) -> String {
-    problems.iter().map(|p| format!("\n  - {p}")).collect()
+    let told = problems.iter().take(TOLD);
+    let told: String = told.map(|p| format!("\n  - {p}")).collect();
+    match problems.len().saturating_sub(TOLD) {
+        0 => told,
+        more => format!("{told}\n  - and {more} more of this kind or others"),
+    }
 }

@@ -6,8 +6,17 @@ use crate::anatomy::Structure;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Note {
-    #[error("the CT's voxels of {0} were resampled to {1} mm along the world's axes")]
-    Resampled(String, f64),
+    #[error(
+        "the CT's voxels of {from} were resampled to {voxel_mm} mm along the world's axes{}",
+        if *.thick { "; so thick ones lose thin bone and close the joint space, which no resampling brings back" } else { "" }
+    )]
+    Resampled {
+        /// Size of the CT's voxels.
+        from: String,
+        voxel_mm: f64,
+        /// Thicker than a study should be made of.
+        thick: bool,
+    },
     #[error("the segmentation lies on another grid than the CT and was resampled to it")]
     LabelsResampled,
     #[error("{percent:.1} % of the {structure} lie outside the CT and are lost")]

@@ -6,7 +6,9 @@ use super::grid::{Lattice, around_bones, check_overlap, same_grid};
 use super::note::Note;
 use super::origin::CtOrigin;
 use super::parameters::CtImportParameters;
-use crate::anatomy::detect::{BoneSurfaces, Detected, Given, Marks, by_reason, detect_with};
+use crate::anatomy::detect::{
+    BoneSurfaces, Detected, Given, Marks, by_reason, by_rule_but, detect_with,
+};
 use crate::anatomy::{Landmark, Landmarks, Side, Source, Specimen, Structure, StructureLabels};
 use crate::geometry::Vector;
 use crate::volume::resample::resample_labels;
@@ -18,6 +20,9 @@ const SURFACE_MARGIN_MM: f64 = 5.0;
 /// A femur that ends nearer below its head is worth a word (mm): heads differ in height by less than
 /// what is missing from 150 mm here.
 const FEMUR_MM: f64 = 145.0;
+
+/// Thicker slices than this blur thin bone (mm): what `specimen check` takes for a specimen's voxels.
+const THICK_MM: f64 = 1.5;
 
 /// What a specimen is made of.
 #[derive(Clone, Debug)]
@@ -69,8 +74,11 @@ pub fn specimen_from_ct(
 
     let lattice = Lattice::of(&import.ct.grid, voxel_mm);
     if let Lattice::New { .. } = lattice {
-        let [i, j, k] = import.ct.grid.spacing;
-        notes.push(Note::Resampled(format!("{i} x {j} x {k} mm"), voxel_mm));
+        notes.push(Note::Resampled {
+            from: spacing(&import.ct.grid),
+            voxel_mm,
+            thick: import.ct.grid.spacing.iter().any(|mm| *mm > THICK_MM),
+        });
     }
     // Values on the lattice already are read there without arithmetic, whatever a header rounded.
     let structures = match same_grid(&structures.volume().grid, &import.ct.grid) {
@@ -93,7 +101,13 @@ pub fn specimen_from_ct(
     notes.extend(short_femora(&surfaces, &marks.landmarks));
     let specimen = Specimen {
         name: import.origin.name.clone(),
-        source: source(&import.origin, &marks, &lattice, parameters),
+        source: source(
+            &import.ct.grid,
+            &import.origin,
+            &marks,
+            &lattice,
+            parameters,
+        ),
         ct,
         labels,
         landmarks: marks.landmarks,
@@ -211,20 +225,24 @@ fn short_femora(surfaces: &BoneSurfaces, landmarks: &Landmarks) -> Vec<Note> {
     notes
 }
 
+/// A grid's voxels, for people.
+fn spacing(grid: &Grid) -> String {
+    let [i, j, k] = grid.spacing.map(|mm| (mm * 1000.0).round() / 1000.0);
+    format!("{i} x {j} x {k} mm")
+}
+
 fn source(
+    ct: &Grid,
     origin: &CtOrigin,
     marks: &Marks,
     lattice: &Lattice,
     parameters: &CtImportParameters,
 ) -> Source {
     let voxels = match lattice {
-        Lattice::Kept { .. } => "as they were",
-        Lattice::New { .. } => "resampled",
+        Lattice::Kept { .. } => "as they were".to_owned(),
+        Lattice::New { .. } => format!("resampled from {}", spacing(ct)),
     };
-    let landmarks = match marks.given.as_slice() {
-        [] => "found by rule".to_owned(),
-        given => format!("found by rule but for those given: {}", given.join(", ")),
-    };
+    let landmarks = by_rule_but(&marks.given);
     Source {
         kind: origin.kind.to_owned(),
         description: format!(

@@ -9,7 +9,7 @@ use super::origin::SurfacesOrigin;
 use super::parameters::SurfacesParameters;
 use super::soft_tissue::soft_tissue;
 use super::voxelize::for_each_inside;
-use crate::anatomy::detect::{BoneSurfaces, Given, Head, Place, detect_with};
+use crate::anatomy::detect::{BoneSurfaces, Given, Head, Place, by_rule_but, detect_with};
 use crate::anatomy::import::{Imported, told};
 use crate::anatomy::{Label, Landmark, Side, Source, Specimen, Structure, StructureLabels};
 use crate::geometry::{Point, Vector};
@@ -96,7 +96,7 @@ pub fn specimen_from_surfaces_with(
     let notes = told(&marks);
     let specimen = Specimen {
         name: origin.name.clone(),
-        source: surfaces_source(origin, parameters),
+        source: surfaces_source(origin, parameters, &marks.given),
         ct,
         labels,
         landmarks: marks.landmarks,
@@ -111,16 +111,24 @@ impl<'a> Bone<'a> {
     }
 }
 
-/// What a specimen from surfaces is, for people.
-pub fn surfaces_source(origin: &SurfacesOrigin, p: &SurfacesParameters) -> Source {
+/// What a specimen from surfaces is, for people. `given` are the names of landmarks and rims that were not found
+/// by rule.
+pub fn surfaces_source(
+    origin: &SurfacesOrigin,
+    p: &SurfacesParameters,
+    given: &[String],
+) -> Source {
     Source {
         kind: "surfaces".into(),
         description: format!(
             "Bone surfaces from {}. Only sacrum, hip bones and femora were there: no spine. \
              Hounsfield values are assigned by depth below the surfaces and the body around the \
-             bones is made up (seed {}, cortical bone {} HU, {} mm). Landmarks and rims were found \
-             by rule.",
-            origin.from, p.seed, p.cortical_hu, p.cortical_mm
+             bones is made up (seed {}, cortical bone {} HU, {} mm). Landmarks and rims: {}.",
+            origin.from,
+            p.seed,
+            p.cortical_hu,
+            p.cortical_mm,
+            by_rule_but(given)
         ),
         licence: origin.licence.clone(),
         sex: origin.sex.clone(),

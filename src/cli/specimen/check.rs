@@ -26,24 +26,16 @@ pub struct Arguments {
 }
 
 pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    if let Some(file) = &arguments.sheet
+        && file.extension().is_none_or(|ending| ending != "png")
+    {
+        return Err(Failure::Usage(format!(
+            "--sheet is {}; expected a name that ends with .png",
+            file.display()
+        )));
+    }
     let specimen = Arc::new(arguments.source.specimen()?);
-    let mut checks: Vec<Check> = specimen_problems(&specimen)
-        .iter()
-        .map(|problem| {
-            Check::holds("specimen", false, problem.to_string(), "no problem")
-                .advise("a study refuses it; mend what is named")
-        })
-        .collect();
-    checks.extend(check_specimen(&specimen));
-    let hips: Vec<(Hip, Plan)> = Side::BOTH
-        .into_iter()
-        .filter_map(|side| Hip::new(specimen.clone(), side).ok())
-        .map(|hip| {
-            let plan = plan(&hip);
-            (hip, plan)
-        })
-        .collect();
-    checks.extend(hips.iter().map(|(hip, plan)| surgery(hip, plan)));
+    let (checks, hips) = judge(&specimen);
     if let Some(file) = &arguments.sheet {
         sheet(&specimen, &hips, &checks).write(file)?;
     }
@@ -55,6 +47,36 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     }
     let wrong = checks.iter().any(|check| check.verdict == Verdict::Wrong);
     Ok(if wrong { Exit::Error } else { Exit::Complete })
+}
+
+/// All checks, and both hips with their planned cuts.
+fn judge(specimen: &Arc<Specimen>) -> (Vec<Check>, Vec<(Hip, Plan)>) {
+    let mut checks: Vec<Check> = specimen_problems(specimen)
+        .iter()
+        .map(|problem| {
+            Check::holds("specimen", false, problem.to_string(), "no problem")
+                .advise("a study refuses it; mend what is named")
+        })
+        .collect();
+    checks.extend(check_specimen(specimen));
+    let hips: Vec<(Hip, Plan)> = Side::BOTH
+        .into_iter()
+        .filter_map(|side| Hip::new(specimen.clone(), side).ok())
+        .map(|hip| {
+            let plan = plan(&hip);
+            (hip, plan)
+        })
+        .collect();
+    checks.extend(hips.iter().map(|(hip, plan)| surgery(hip, plan)));
+    (checks, hips)
+}
+
+/// What is not fine about a specimen, and how many checks there were.
+pub fn findings(specimen: &Arc<Specimen>) -> (Vec<Check>, usize) {
+    let (mut checks, _) = judge(specimen);
+    let count = checks.len();
+    checks.retain(|check| check.verdict != Verdict::Fine);
+    (checks, count)
 }
 
 type Plan = Result<(CutPlanes, SurgeryMap), String>;
@@ -88,13 +110,18 @@ fn sheet(specimen: &Specimen, hips: &[(Hip, Plan)], checks: &[Check]) -> Paintin
     check_sheet(specimen, &hips, checks)
 }
 
+/// What to do, where something is to be done.
+fn advice(check: &Check) -> Option<&str> {
+    (check.verdict != Verdict::Fine).then_some(&check.advice)
+}
+
 fn print(specimen: &Specimen, checks: &[Check], common: &Common) {
     if common.json {
         for check in checks {
             say!(
                 "{}",
                 json!({"specimen": specimen.name, "check": check.what, "found": check.found,
-                    "expected": check.expected, "verdict": check.verdict.name(), "advice": check.advice})
+                    "expected": check.expected, "verdict": check.verdict.name(), "advice": advice(check)})
             );
         }
         return;

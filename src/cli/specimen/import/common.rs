@@ -3,6 +3,8 @@
 use crate::cli::args::Common;
 use crate::cli::error::{Exit, Failure};
 use crate::cli::output::say;
+use crate::cli::specimen::check::findings;
+use pao_sim::anatomy::check::{Check, Verdict};
 use pao_sim::anatomy::detect::{Given, Unfound};
 use pao_sim::anatomy::import::{
     CtImport, CtImportError, CtImportParameters, CtOrigin, Imported, Note, specimen_from_ct,
@@ -10,10 +12,14 @@ use pao_sim::anatomy::import::{
 use pao_sim::anatomy::landmark_files::{
     LandmarkOverrides, PointsFileError, read_landmark_overrides, write_markups,
 };
-use pao_sim::anatomy::{Landmarks, Side, SpecimenError, StructureLabels, write_specimen};
+use pao_sim::anatomy::{
+    Landmarks, SEXES, Side, Specimen, SpecimenError, StructureLabels, is_specimen_name,
+    write_specimen,
+};
 use pao_sim::volume::{Volume, read_dicom_series_of, read_volume};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Flags of every importer.
 #[derive(Debug, clap::Args)]
@@ -108,6 +114,25 @@ impl Shared {
                 return Err(PointsFileError::Exists(draft.clone()).into());
             }
         }
+        let name = folder_name(&self.out);
+        for (flag, name) in [("--out", Some(&name)), ("--name", self.name.as_ref())] {
+            if let Some(name) = name
+                && !is_specimen_name(name)
+            {
+                return Err(Failure::Usage(format!(
+                    "{flag} names the specimen '{name}'; expected letters, digits and '-' only: it goes into the \
+                     keys of registrations"
+                )));
+            }
+        }
+        if let Some(sex) = &self.sex
+            && !SEXES.contains(&sex.as_str())
+        {
+            return Err(Failure::Usage(format!(
+                "--sex is {sex}; expected {}",
+                SEXES.join(", ")
+            )));
+        }
         match self.out.exists() {
             true => Err(SpecimenError::Exists(self.out.clone()).into()),
             false => Ok(()),
@@ -132,33 +157,67 @@ impl Shared {
         Ok(all)
     }
 
-    /// Writes the specimen and tells about it; what was found for 3D Slicer first, also where that is not all.
+    /// Writes the specimen, checks it and tells about it; what was found for 3D Slicer first, also where that
+    /// is not all. Ends with [`Exit::Error`] where a check says that the specimen is wrong.
     pub fn finish<E: Into<Failure>>(
         &self,
         made: Result<Imported, E>,
         unfound: impl Fn(&E) -> Option<&Unfound>,
         common: &Common,
     ) -> Result<Exit, Failure> {
-        if let Some(draft) = &self.draft_landmarks {
-            let found = match &made {
-                Ok(Imported { specimen, .. }) => Some((
-                    &specimen.landmarks,
-                    Side::BOTH.map(|side| specimen.rim(side)),
-                )),
-                Err(error) => unfound(error).map(|found| {
-                    let rim = |side: Side| found.rims[side.index()].as_deref();
-                    let points = |side| rim(side).map_or(&[][..], Vec::as_slice);
-                    (&found.landmarks, Side::BOTH.map(points))
-                }),
-            };
-            if let Some((landmarks, rims)) = found {
-                write_markups(landmarks, rims, draft)?;
-            }
+        let draft = self.write_draft(&made, unfound)?;
+        if made.is_err() && !common.json {
+            draft.iter().for_each(|line| eprintln!("{line}"));
         }
-        let made = made.map_err(E::into)?;
-        write_specimen(&made.specimen, &self.out)?;
-        tell(&made, &self.out, common);
-        Ok(Exit::Complete)
+        let Imported { specimen, notes } = made.map_err(E::into)?;
+        write_specimen(&specimen, &self.out)?;
+        let mut notes: Vec<String> = notes.iter().map(ToString::to_string).collect();
+        notes.extend(draft);
+        let folder = folder_name(&self.out);
+        if specimen.name != folder {
+            notes.push(format!(
+                "its name is {}, but a study calls it {folder}, by its folder",
+                specimen.name
+            ));
+        }
+        let specimen = Arc::new(specimen);
+        let (findings, checks) = findings(&specimen);
+        tell(&specimen, &self.out, &notes, (&findings, checks), common);
+        let wrong = findings.iter().any(|check| check.verdict == Verdict::Wrong);
+        Ok(if wrong { Exit::Error } else { Exit::Complete })
+    }
+
+    /// A line that says what was written.
+    fn write_draft<E>(
+        &self,
+        made: &Result<Imported, E>,
+        unfound: impl Fn(&E) -> Option<&Unfound>,
+    ) -> Result<Option<String>, Failure> {
+        let Some(draft) = &self.draft_landmarks else {
+            return Ok(None);
+        };
+        let (landmarks, rims, missing) = match made {
+            Ok(Imported { specimen, .. }) => {
+                let rims = Side::BOTH.map(|side| specimen.rim(side));
+                (&specimen.landmarks, rims, vec![])
+            }
+            Err(error) => {
+                let Some(found) = unfound(error) else {
+                    return Ok(None);
+                };
+                let rim = |side: Side| found.rims[side.index()].as_deref();
+                let points = |side| rim(side).map_or(&[][..], Vec::as_slice);
+                let missing = found.missing.iter().map(|missing| missing.name());
+                (&found.landmarks, Side::BOTH.map(points), missing.collect())
+            }
+        };
+        write_markups(landmarks, rims, draft)?;
+        let missing = match missing.as_slice() {
+            [] => String::new(),
+            names => format!("; to be placed: {}", names.join(", ")),
+        };
+        let draft = draft.display();
+        Ok(Some(format!("{draft} holds landmarks and rims{missing}")))
     }
 }
 
@@ -225,17 +284,28 @@ pub fn folder_name(path: &Path) -> String {
     name.to_string_lossy().into_owned()
 }
 
-/// Prints what was made, and every note.
-fn tell(made: &Imported, folder: &Path, common: &Common) {
-    let Imported { specimen, notes } = made;
+/// Prints what was made, every note, and what the specimen's checks found.
+fn tell(
+    specimen: &Specimen,
+    folder: &Path,
+    notes: &[String],
+    (findings, checks): (&[Check], usize),
+    common: &Common,
+) {
     let [i, j, k] = specimen.ct.grid.dims;
     let mm = specimen.ct.grid.spacing[0];
-    let notes: Vec<String> = notes.iter().map(ToString::to_string).collect();
     if common.json {
+        let findings: Vec<Value> = findings
+            .iter()
+            .map(|check| {
+                json!({"check": check.what, "found": check.found, "expected": check.expected,
+                    "verdict": check.verdict.name(), "advice": check.advice})
+            })
+            .collect();
         say!(
             "{}",
             json!({"specimen": specimen.name, "folder": folder, "dims": [i, j, k], "voxel_mm": mm,
-                "notes": notes})
+                "notes": notes, "checks": checks, "findings": findings})
         );
         return;
     }
@@ -246,5 +316,21 @@ fn tell(made: &Imported, folder: &Path, common: &Common) {
     );
     for note in notes {
         say!("- {note}");
+    }
+    match findings.len() {
+        0 => say!("{checks} checks, all ok"),
+        found => {
+            say!("{checks} checks, of which {found} are not ok (specimen check tells all of them):")
+        }
+    }
+    for check in findings {
+        let verdict = check.verdict.name();
+        say!(
+            "- {verdict}: {}: {}; expected {}. {}",
+            check.what,
+            check.found,
+            check.expected,
+            check.advice
+        );
     }
 }
