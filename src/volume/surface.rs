@@ -61,6 +61,8 @@ pub struct Surface {
     pieces: Vec<u32>,
     /// Built at the first query: many surfaces are only moved or measured.
     index: OnceLock<Index>,
+    /// One per vertex, at the first question.
+    areas: OnceLock<Vec<f64>>,
 }
 
 impl std::fmt::Debug for Surface {
@@ -109,6 +111,7 @@ impl Surface {
             normals,
             pieces,
             index: OnceLock::new(),
+            areas: OnceLock::new(),
         }
     }
 
@@ -182,15 +185,17 @@ impl Surface {
     }
 
     /// The part of the area that each vertex stands for (mm^2): a third of its triangles'.
-    pub fn vertex_areas(&self) -> Vec<f64> {
-        let mut areas = vec![0.0; self.vertices.len()];
-        for (t, triangle) in self.triangles.iter().enumerate() {
-            let third = area_vector(&self.corners(t)).norm() / 6.0;
-            for &v in triangle {
-                areas[v as usize] += third;
+    pub fn vertex_areas(&self) -> &[f64] {
+        self.areas.get_or_init(|| {
+            let mut areas = vec![0.0; self.vertices.len()];
+            for (t, triangle) in self.triangles.iter().enumerate() {
+                let third = area_vector(&self.corners(t)).norm() / 6.0;
+                for &v in triangle {
+                    areas[v as usize] += third;
+                }
             }
-        }
-        areas
+            areas
+        })
     }
 
     /// Enclosed volume in mm^3, by the divergence theorem; positive for outward triangles.

@@ -152,7 +152,7 @@ impl<'a> Outline<'a> {
     pub fn surface_point(&self, edge: &Vector2<f64>, inward: &Vector2<f64>) -> Option<Point> {
         let [u, v, view] = self.axes;
         let areas = self.surface.vertex_areas();
-        let depths = self.surface.vertices().iter().zip(&areas).map(|(p, area)| {
+        let depths = self.surface.vertices().iter().zip(areas).map(|(p, area)| {
             let d = p - self.origin;
             let at = Vector2::new(d.dot(&u), d.dot(&v)) - edge;
             let beside = (at.x * inward.y - at.y * inward.x) / BESIDE_MM;
