@@ -8,7 +8,7 @@ use super::population_folder::specimens_in;
 use super::{Scenario, StrategyParameters};
 use crate::anatomy::phantom::PhantomParameters;
 use crate::anatomy::surfaces::SurfacesParameters;
-use crate::anatomy::{LceApex, Side};
+use crate::anatomy::{LceApex, Side, is_specimen_name};
 use crate::geometry::{Point, Vector};
 use crate::simulation::{
     AnnotationParameters, FluoroscopyParameters, MovementParameters, PickParameters,
@@ -418,7 +418,7 @@ impl Config {
     pub fn problems(&self) -> Vec<(String, String)> {
         let mut p = Problems::default();
         let study = &self.study;
-        if !is_name(&study.name, "-_") {
+        if !is_name(&study.name) {
             let found = &study.name;
             p.add(
                 "study.name",
@@ -461,7 +461,7 @@ impl Config {
             .map(SpecimenSource::name)
             .collect();
         for (place, name) in names.iter().enumerate().skip(population.phantoms.len()) {
-            if !is_name(name, "-") {
+            if !is_specimen_name(name) {
                 let expected = "expected a folder named with letters, digits and -";
                 p.add(
                     "population",
@@ -508,7 +508,7 @@ impl Config {
 
         for (name, strategy) in &self.registration {
             let section = format!("registration.{name}");
-            if !is_name(name, "-_") {
+            if !is_name(name) {
                 p.add(
                     &section,
                     "has a name with other than letters, digits, - and _".into(),

@@ -5,7 +5,7 @@
 //! lines and the arguments of `replay` and `show`, so each has one spelling only.
 
 use super::Scenario;
-use crate::anatomy::Side;
+use crate::anatomy::{Side, is_specimen_name};
 use std::fmt;
 use std::str::FromStr;
 
@@ -135,7 +135,7 @@ fn registration(text: &str) -> Result<RegistrationKey, String> {
     else {
         return Err(format!("it has {} parts, not 7", parts.len()));
     };
-    if !is_name(strategy, "-_") {
+    if !is_name(strategy) {
         return Err(format!("\"{strategy}\" is no strategy's name"));
     }
     Ok(RegistrationKey {
@@ -148,7 +148,7 @@ fn registration(text: &str) -> Result<RegistrationKey, String> {
 }
 
 fn case(specimen: &str, side: &str, fragment: &str, movement: &str) -> Result<CaseKey, String> {
-    if !is_name(specimen, "-") {
+    if !is_specimen_name(specimen) {
         return Err(format!("\"{specimen}\" is no specimen's name"));
     }
     let side = Side::BOTH
@@ -175,12 +175,12 @@ fn number(text: &str, letter: char, width: usize) -> Result<u32, String> {
         })
 }
 
-/// True for names that keys may hold: ASCII letters, digits and those of `others`.
-pub(super) fn is_name(text: &str, others: &str) -> bool {
+/// True for names of studies and strategies: ASCII letters, digits, `-` and `_`.
+pub(super) fn is_name(text: &str) -> bool {
     !text.is_empty()
         && text
             .chars()
-            .all(|c| c.is_ascii_alphanumeric() || others.contains(c))
+            .all(|c| c.is_ascii_alphanumeric() || "-_".contains(c))
 }
 
 #[cfg(test)]

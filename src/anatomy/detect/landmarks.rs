@@ -168,9 +168,7 @@ pub fn detect_with(bones: &BoneSurfaces, given: &Landmarks) -> Result<Detected, 
 /// The directions left and superior of the AP view, or what it lacks: a landmark neither found nor given.
 fn app_axes(found: &Landmarks, given: &Landmarks) -> Result<[Vector; 2], String> {
     let mut ground = given.clone();
-    for (landmark, side, point) in found.iter() {
-        ground.set(landmark, side, point);
-    }
+    ground.set_all(found);
     let keys = [Landmark::Asis, Landmark::Ips].map(|l| Side::BOTH.map(|s| (l, s)));
     let absent = keys.as_flattened().iter();
     let absent = absent.filter(|(landmark, side)| ground.get(*landmark, *side).is_none());
