@@ -1,5 +1,6 @@
 //! `pao-sim specimen check`: is a specimen what it says?
 
+use super::check_ending;
 use super::show::plan;
 use super::source::Source;
 use crate::cli::args::Common;
@@ -9,7 +10,7 @@ use pao_sim::anatomy::check::{Check, Verdict, check_specimen};
 use pao_sim::anatomy::{Hip, Side, Specimen, specimen_problems};
 use pao_sim::report::specimen::{HipPlan, Painting, check_sheet};
 use pao_sim::surgery::{CutPlanes, SurgeryMap};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -26,13 +27,8 @@ pub struct Arguments {
 }
 
 pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
-    if let Some(file) = &arguments.sheet
-        && file.extension().is_none_or(|ending| ending != "png")
-    {
-        return Err(Failure::Usage(format!(
-            "--sheet is {}; expected a name that ends with .png",
-            file.display()
-        )));
+    if let Some(file) = &arguments.sheet {
+        check_ending("--sheet", file, ".png")?;
     }
     let specimen = Arc::new(arguments.source.specimen()?);
     let (checks, hips) = judge(&specimen);
@@ -45,8 +41,15 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     {
         say!("{}", file.display());
     }
-    let wrong = checks.iter().any(|check| check.verdict == Verdict::Wrong);
-    Ok(if wrong { Exit::Error } else { Exit::Complete })
+    Ok(exit(&checks))
+}
+
+/// [`Exit::Error`] where anything is wrong.
+pub fn exit(checks: &[Check]) -> Exit {
+    match checks.iter().any(|check| check.verdict == Verdict::Wrong) {
+        true => Exit::Error,
+        false => Exit::Complete,
+    }
 }
 
 /// All checks, and both hips with their planned cuts.
@@ -110,19 +113,19 @@ fn sheet(specimen: &Specimen, hips: &[(Hip, Plan)], checks: &[Check]) -> Paintin
     check_sheet(specimen, &hips, checks)
 }
 
-/// What to do, where something is to be done.
-fn advice(check: &Check) -> Option<&str> {
-    (check.verdict != Verdict::Fine).then_some(&check.advice)
+/// A check for programs, with its advice where something is to be done.
+pub fn as_json(check: &Check) -> Value {
+    let advice = (check.verdict != Verdict::Fine).then_some(&check.advice);
+    json!({"check": check.what, "found": check.found, "expected": check.expected,
+        "verdict": check.verdict.name(), "advice": advice})
 }
 
 fn print(specimen: &Specimen, checks: &[Check], common: &Common) {
     if common.json {
         for check in checks {
-            say!(
-                "{}",
-                json!({"specimen": specimen.name, "check": check.what, "found": check.found,
-                    "expected": check.expected, "verdict": check.verdict.name(), "advice": advice(check)})
-            );
+            let mut line = as_json(check);
+            line["specimen"] = specimen.name.as_str().into();
+            say!("{line}");
         }
         return;
     }

@@ -1,6 +1,6 @@
 //! `pao-sim specimen landmarks`: a specimen's landmarks for 3D Slicer.
 
-use super::import::check_markups_name;
+use super::check_ending;
 use super::source::Source;
 use crate::cli::args::Common;
 use crate::cli::error::{Exit, Failure};
@@ -22,7 +22,7 @@ pub struct Arguments {
 
 pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let out = &arguments.out;
-    check_markups_name("--out", out)?;
+    check_ending("--out", out, ".mrk.json")?;
     let specimen = arguments.source.specimen()?;
     write_markups(
         &specimen.landmarks,

@@ -9,6 +9,7 @@ mod source;
 use super::args::Common;
 use super::error::{Exit, Failure};
 use clap::Subcommand;
+use std::path::Path;
 
 /// Make, show and check specimens.
 #[derive(Debug, clap::Args)]
@@ -36,5 +37,17 @@ pub fn main(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         Command::Show(own) => show::main(own, common),
         Command::Landmarks(own) => landmarks::main(own, common),
         Command::Check(own) => check::main(own, common),
+    }
+}
+
+/// Refuses a file that is named otherwise than what is written to it: programs tell by its name what a file is.
+fn check_ending(flag: &str, path: &Path, ending: &str) -> Result<(), Failure> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    match name.strip_suffix(ending) {
+        Some(stem) if !stem.is_empty() => Ok(()),
+        _ => Err(Failure::Usage(format!(
+            "{flag} is {}; expected a name that ends with {ending}",
+            path.display()
+        ))),
     }
 }

@@ -3,8 +3,9 @@
 use crate::cli::args::Common;
 use crate::cli::error::{Exit, Failure};
 use crate::cli::output::say;
-use crate::cli::specimen::check::findings;
-use pao_sim::anatomy::check::{Check, Verdict};
+use crate::cli::specimen::check::{as_json, exit, findings};
+use crate::cli::specimen::check_ending;
+use pao_sim::anatomy::check::Check;
 use pao_sim::anatomy::detect::{Given, Unfound};
 use pao_sim::anatomy::import::{
     CtImport, CtImportError, CtImportParameters, CtOrigin, Imported, Note, specimen_from_ct,
@@ -106,10 +107,11 @@ pub struct Read {
 }
 
 impl Shared {
-    /// Says so when the folder is there: what takes a minute is not begun for nothing.
+    /// What can be refused before the work: a draft or folder that is there, a name that no study takes, an unknown
+    /// sex.
     pub fn check(&self) -> Result<(), Failure> {
         if let Some(draft) = &self.draft_landmarks {
-            check_markups_name("--draft-landmarks", draft)?;
+            check_ending("--draft-landmarks", draft, ".mrk.json")?;
             if draft.exists() {
                 return Err(PointsFileError::Exists(draft.clone()).into());
             }
@@ -183,8 +185,7 @@ impl Shared {
         let specimen = Arc::new(specimen);
         let (findings, checks) = findings(&specimen);
         tell(&specimen, &self.out, &notes, (&findings, checks), common);
-        let wrong = findings.iter().any(|check| check.verdict == Verdict::Wrong);
-        Ok(if wrong { Exit::Error } else { Exit::Complete })
+        Ok(exit(&findings))
     }
 
     /// A line that says what was written.
@@ -265,17 +266,6 @@ fn unfound(error: &CtImportError) -> Option<&Unfound> {
     }
 }
 
-/// Says so when a file for 3D Slicer is named otherwise: Slicer tells what a file is by its name.
-pub fn check_markups_name(flag: &str, path: &Path) -> Result<(), Failure> {
-    match path.to_string_lossy().ends_with(".mrk.json") {
-        true => Ok(()),
-        false => Err(Failure::Usage(format!(
-            "{flag} is {}; expected a name that ends with .mrk.json",
-            path.display()
-        ))),
-    }
-}
-
 /// The name of a file or folder, also of `.` and `..`.
 pub fn folder_name(path: &Path) -> String {
     let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
@@ -295,13 +285,7 @@ fn tell(
     let [i, j, k] = specimen.ct.grid.dims;
     let mm = specimen.ct.grid.spacing[0];
     if common.json {
-        let findings: Vec<Value> = findings
-            .iter()
-            .map(|check| {
-                json!({"check": check.what, "found": check.found, "expected": check.expected,
-                    "verdict": check.verdict.name(), "advice": check.advice})
-            })
-            .collect();
+        let findings: Vec<Value> = findings.iter().map(as_json).collect();
         say!(
             "{}",
             json!({"specimen": specimen.name, "folder": folder, "dims": [i, j, k], "voxel_mm": mm,

@@ -11,8 +11,6 @@ use crate::cli::args::Common;
 use crate::cli::error::{Exit, Failure};
 use clap::Subcommand;
 
-pub use common::check_markups_name;
-
 #[derive(Debug, Subcommand)]
 pub enum From {
     /// From closed surfaces of the bones (.ply, .stl, .vtk or .obj; mm): Sacrum, Hip_L, Hip_R, Femur_L
