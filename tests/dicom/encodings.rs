@@ -3,17 +3,20 @@
 use crate::{EXPLICIT, assert_place, assert_refused, axes, fixture, hounsfield, replaced, wrong};
 use pao_sim::volume::{VolumeFileError, read_dicom_series};
 
+/// A slice of one series in each.
+const ENCODINGS: [&str; 7] = [
+    "explicit",
+    "implicit",
+    "big_endian",
+    "deflated",
+    "rle",
+    "jpeg_lossless",
+    "jpeg_lossless_p14",
+];
+
 #[test]
 fn every_encoding_holds_the_same_voxels() {
-    for encoding in [
-        "explicit",
-        "implicit",
-        "big_endian",
-        "deflated",
-        "rle",
-        "jpeg_lossless",
-        "jpeg_lossless_p14",
-    ] {
+    for encoding in ENCODINGS {
         let folder = tempfile::tempdir().unwrap();
         for (from, to) in [(encoding, "B"), ("second", "A.DCM")] {
             let from = fixture("encodings").join(format!("{from}.dcm"));
@@ -107,14 +110,7 @@ fn a_wrong_transfer_syntax_is_found_out() {
 /// Every length of every encoding: no cut file is read, and none is passed over.
 #[test]
 fn a_file_that_was_cut_is_refused_wherever_it_was_cut() {
-    for encoding in [
-        "explicit",
-        "implicit",
-        "big_endian",
-        "deflated",
-        "rle",
-        "jpeg_lossless",
-    ] {
+    for encoding in ENCODINGS {
         let folder = tempfile::tempdir().unwrap();
         let second = folder.path().join("second");
         std::fs::copy(fixture("encodings/second.dcm"), second).unwrap();
